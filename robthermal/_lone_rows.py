@@ -29,7 +29,6 @@ def lone_rows(column: NDArray[np.float64]) -> NDArray[np.intp]:
     Examples
     --------
     >>> import numpy as np
-    >>> import numpy as np
     >>> current = np.full(500, 4.37)
     >>> current[40] = 1.10
     >>> lone_rows(current)

@@ -17,51 +17,6 @@ from .diagnosis import Diagnosis
 Data = Measured | Sequence[Measured] | None
 
 
-@dataclass(frozen=True)
-class Arguments:
-    """Data of a diagnosis without misread rows of inputs.
-
-    Parameters
-    ----------
-    records : list of Record or FrequencyResponse
-        Data of the fit.
-    validation, reference : list of Record or FrequencyResponse, or None
-        The others, as far as they are given.
-    said : tuple of str
-        What was replaced, a sentence for every input of a record.
-    doubted : tuple of str
-        Of which rows the readings do not tell, in the same way.
-    """
-
-    records: list[Measured]
-    validation: list[Measured] | None
-    reference: list[Measured] | None
-    said: tuple[str, ...]
-    doubted: tuple[str, ...]
-
-
-def without_misread_rows(system: System, records: Data, validation: Data, reference: Data,
-                         fitted: Callable[[list[Record]], System]) -> Arguments:
-    """Data without single rows of heaters and currents that the readings did not follow.
-
-    Parameters
-    ----------
-    system : System
-        As the file describes it.
-    records, validation, reference : Record, FrequencyResponse, list of them, or None
-        As `diagnose` takes them.
-    fitted : callable
-        Fits the system to records; called only where a row is in doubt.
-    """
-    (old, _), (new, responses), (beside, beside_responses) = (
-        ([], []) if data is None else measured_of(data, where)
-        for data, where in ((reference, "reference"), (records, "records"), (validation, "validation")))
-    rows = mended(system, [*old, *new], beside, fitted)
-    return Arguments([*rows.records[len(old):], *responses],
-                     None if validation is None else [*rows.validation, *beside_responses],
-                     None if reference is None else [*rows.records[:len(old)]], rows.said, rows.doubted)
-
-
 @dataclass
 class MisreadRows:
     """Rows of the inputs of a diagnosis that did not act: asked before it, and where that did not tell, after it.
@@ -96,12 +51,18 @@ class MisreadRows:
         fitted : callable
             Fits the system to records.
         """
-        rows = without_misread_rows(self.system, self.records, self.validation, self.reference, fitted)
+        (old, _), (new, responses), (beside, beside_responses) = (
+            ([], []) if data is None else measured_of(data, where)
+            for data, where in ((self.reference, "reference"), (self.records, "records"),
+                                (self.validation, "validation")))
+        rows = mended(self.system, [*old, *new], beside, fitted)
         self.doubted, self.replaced = rows.doubted, bool(rows.said)
         if not rows.said:
             return None
-        return _saying(self.again(self.system, rows.records, validation=rows.validation, reference=rows.reference),
-                       rows.said)
+        found = self.again(self.system, [*rows.records[len(old):], *responses],
+                           validation=None if self.validation is None else [*rows.validation, *beside_responses],
+                           reference=None if self.reference is None else rows.records[:len(old)])
+        return _saying(found, rows.said)
 
     def left_out_beside(self, found: Diagnosis) -> Diagnosis:
         """The answer, with what is said of rows in doubt; without these, where its effects show that they did not act.

@@ -53,8 +53,8 @@ def free_run(system: System, one: Data, start: Start, noise: Mapping[str, float]
     """Run a model freely on a record that its fit has not seen.
 
     A free start is estimated on the first tenth of the record (with its prior). Where that leaves it so open that the
-    readings of the record could be off by more than their noise (rms), it is estimated on the whole record: the start
-    of a body without a thermometer, which shows late.
+    readings of the record could be off by more than 0.3 of their noise (rms), it is estimated on the whole record: the
+    start of a body without a thermometer, which shows late.
 
     Parameters
     ----------

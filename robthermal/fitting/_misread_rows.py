@@ -175,7 +175,8 @@ class _Row:
 
 def _in_words(record: Record, name: str, rows: Sequence[int], what: str) -> str:
     row, values = rows[0], record[name]
-    time, more = float(record.time[row]), f", and so in {len(rows) - 1} more rows" if len(rows) > 1 else ""
+    time, others = float(record.time[row]), len(rows) - 1
+    more = f", and so in {others} more row{'s' * (others > 1)}" if others else ""
     return (f"{name!r} in {record.name or 'the record'} is {values[row]:.4g} at {time:.6g} s, between "
             f"{values[row - 1]:.4g} and {values[row + 1]:.4g}{more}{what}")
 

@@ -83,3 +83,14 @@ def test_a_broken_sensor_beside_a_steady_heater_is_refused() -> None:
     readings[rng.choice(np.arange(60, len(readings) - 5), len(readings) // 10, replace=False), 0] += 3.0
     with pytest.raises(rt.InputError, match="isolated outliers"):
         rt.diagnosis.noise_floor(model(), record.with_outputs(readings))
+
+
+def test_a_broken_sensor_beside_a_pulsed_heater_is_refused() -> None:
+    """The pulses are as frequent, and every row is near one; the spikes are where they do not step."""
+    board = Board(gain=(0.0112, 0.0074), loss=(0.0128, 0.0155), path=0.00225, lags=(20.0, 33.9), room=292.6)
+    record = day(62, board=board)
+    rng = np.random.default_rng(5)
+    readings = np.array(record.outputs)
+    readings[rng.choice(np.arange(60, len(readings) - 5), len(readings) // 10, replace=False), 0] += 8.0
+    with pytest.raises(rt.InputError, match="isolated outliers"):
+        rt.diagnosis.noise_floor(model(), record.with_outputs(readings))

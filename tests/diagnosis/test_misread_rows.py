@@ -69,7 +69,7 @@ def test_a_calibration_leaves_misread_rows_out_and_says_so() -> None:
     readings = _readings(False, 0.0, 1)
     right = rt.calibrate(_system(), _record(_current(), readings))
     fit = rt.calibrate(_system(), _record(_with_rows(_current()), readings))
-    assert "'tec' in log.csv is 0.4 at 202 s, between 1.5 and 1.5, and so in 1 more rows" in fit.remarks[0]
+    assert "'tec' in log.csv is 0.4 at 202 s, between 1.5 and 1.5, and so in 1 more row," in fit.remarks[0]
     assert "the readings did not follow: misread" in fit.remarks[0]
     assert fit.parameters == pytest.approx(right.parameters, rel=1e-9)
     assert not any("misread" in one for one in right.remarks)

@@ -87,7 +87,7 @@ def cleaned(system: System, one: Data, noise: Array) -> Data:
     for i in np.flatnonzero(missing.any(axis=0)):
         rows = np.flatnonzero(missing[:, i] & ~changing[:, i])
         kept = rows[in_rhythm(rows, own[rows, i] - r[rows, i])]
-        if rows.size > MOST * len(r) and np.mean(_beside_steps(one)[rows]) >= _MOSTLY:
+        if rows.size > MOST * len(r) and _follow_steps(one, rows):
             kept = rows
         missing[kept, i], r[kept, i] = False, own[kept, i]
     if not missing.any():
@@ -99,11 +99,15 @@ def cleaned(system: System, one: Data, noise: Array) -> Data:
     return replace(one, record=one.record.with_outputs(outputs), readings=readings, missing=missing)
 
 
-def _beside_steps(one: Data) -> Mask:
-    """Rows within two of a step of an input over half of its range."""
-    inputs = np.asarray(one.record.inputs, float)
-    steps = np.abs(np.diff(inputs, axis=0, prepend=inputs[:1])) > _HALF * np.ptp(inputs, axis=0)
-    return np.asarray(np.convolve(steps.any(axis=1), np.ones(2 * _BESIDE + 1), mode="same") > 0.5)
+def _follow_steps(one: Data, rows: NDArray[np.intp]) -> bool:
+    """Whether most of some rows stand at one distance from steps of one input in one direction."""
+    for column in np.asarray(one.record.inputs, float).T:
+        moves = np.diff(column, prepend=column[:1]) / max(float(np.ptp(column)), 1e-300)
+        for steps in (moves > _HALF, moves < -_HALF):
+            near = (steps[np.clip(rows + late, 0, len(steps) - 1)] for late in range(-_BESIDE, _BESIDE + 1))
+            if any(float(np.mean(one_distance)) >= _MOSTLY for one_distance in near):
+                return True
+    return False
 
 
 def _bridge(r: Array, missing: Mask) -> None:

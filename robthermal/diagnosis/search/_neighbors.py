@@ -119,7 +119,7 @@ def _nearly_best(before: Refit, entries: Sequence[Entry], own: Candidate) -> lis
 
     def alike(entry: Entry) -> bool:
         asked = [as_it_is] if entry.candidate.key in exchanged else []
-        if not asked or not faces & set(own.where) - set(entry.candidate.where):  # a face must do as much in both
+        if not asked or faces & (set(entry.candidate.where) - set(own.where)):  # a face must do as much in both
             asked = [*asked, beside]
         return all(of.get(entry.candidate.key, 0.0) > ALIKE * max(of.values(), default=0.0) for of in asked)
 
