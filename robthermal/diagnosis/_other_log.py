@@ -118,8 +118,7 @@ def asked_of_log(judged: Judged, refitted: Refitted, validation: Validation) -> 
     nominal, found = judged.state.nominal, judged.plain or judged.state.fit
     part = [one[:_PART] for one in records]
     if sum(map(len, records)) > 2 * sum(map(len, part)):
-        asked = _compared(judged, square(nominal, _PART), square(found, _PART))
-        if _explained(part, refitted, judged, asked) is None:
+        if _explained(part, refitted, judged, _on_part(judged, part, refitted)) is None:
             return judged
     asked = _compared(judged, square(nominal), square(found))
     answer = _explained(records, refitted, judged, asked)
@@ -128,6 +127,18 @@ def asked_of_log(judged: Judged, refitted: Refitted, validation: Validation) -> 
     if not asked.clearly(answer) and _distinguished([*records, *_sampled(validation)], refitted, judged):
         return judged
     return _answered(judged, asked, answer)
+
+
+def _on_part(judged: Judged, part: Sequence[Record], refitted: Refitted) -> _Compared:
+    """What the first samples are compared by: fits to them alone leave less there than fits to all samples do."""
+    nominal, found = judged.state.nominal, judged.plain or judged.state.fit
+    before, left = square(nominal, _PART), square(found, _PART)
+    try:
+        plain = refitted(part)
+        both = next(with_some(plain, found, len(found.structure.effects)), plain)
+    except (Diverged, InputError):  # too short, or they lead where the model runs away
+        return _compared(judged, before, left)
+    return _compared(judged, min(before, square(plain)), min(left, square(both)))
 
 
 def _compared(judged: Judged, before: float, left: float) -> _Compared:

@@ -131,7 +131,7 @@ def accepted_effects(state: SearchState, progress: Progress, known: Accepted | N
             if known is not None and not state.rounds:
                 state = replace(state, short=beside(state.short, known.best))
             state = accept(state)
-    return state
+    return replace(state, current=state.scores)  # signatures of all candidates, once more for every effect
 
 
 def _only_coarse(state: SearchState) -> bool:

@@ -9,6 +9,8 @@ import pytest
 from scipy.linalg import expm
 
 import robthermal as rt
+from robthermal.diagnosis import _other_log
+from robthermal.diagnosis._read_otherwise import read_otherwise
 from robthermal.diagnosis.effects import candidates
 from robthermal.diagnosis.evidence import _fewer_trials
 from robthermal.diagnosis.fit import ENOUGH, NoiseScaling, Refit, Structure, exact, fitted, turned
@@ -16,6 +18,7 @@ from robthermal.diagnosis.fit._refitting import _fitted
 from robthermal.diagnosis.path import LinearizedRecord, Whitener, averaged_record
 from robthermal.diagnosis.path._riccati import filtered, spread
 from robthermal.diagnosis.plan import trial_conditions
+from robthermal.diagnosis.search import accept, begin, refit_candidates, shortlist
 
 Array = np.ndarray
 
@@ -179,3 +182,56 @@ def test_a_finished_fit_keeps_what_it_found_only(heated: Refit) -> None:
     assert A.strides[0] == by_start.strides[0] == by_end.strides[0] == path.C.strides[0] == 0
     leaves = np.exp(-0.5 * 10.0 / heated.system.lumps["bar"].capacity * heated.system.links[0].conductance / 0.5)
     assert A[-1, 0, 0] == pytest.approx(leaves, rel=1e-9)
+
+
+def test_derivatives_that_were_forgotten_are_the_same_again(heated: Refit) -> None:
+    J, basis = heated.J.copy(), heated.basis.copy()
+    heated.without_derivatives()
+    assert not {"J", "basis"} & set(vars(heated)) and all(one.slopes is None for one in heated.structure._last)
+    assert np.array_equal(heated.J, J) and np.array_equal(heated.basis, basis)
+
+
+def test_a_round_of_the_search_keeps_no_derivatives_of_what_it_left_behind() -> None:
+    lossy = rt.diagnosis.refit(BAR, convecting(), parameters=UNKNOWN)
+    state = accept(refit_candidates(shortlist(begin(lossy, ["natural_convection", "radiation"]))))
+    left = [entry.fit for round_ in state.rounds for entry in (*round_.contenders, *round_.beaten)]
+    assert left and not state.short.entries
+    assert not any("J" in vars(fit) for fit in left)
+
+
+def wandering() -> rt.Record:
+    """The bar with a heat that wanders."""
+    return read_bar(np.cumsum(np.random.default_rng(6).standard_normal(5000)) * 0.02, 0.0)
+
+
+def convecting() -> rt.Record:
+    """The bar with a loss by natural convection."""
+    return read_bar(np.zeros(5000), 0.05)
+
+
+def read_bar(heat: Array, convection: float) -> rt.Record:
+    """5000 samples of the bar with a heat [W] that no column holds, by Euler steps of a tenth of a sample."""
+    rng = np.random.default_rng(5)
+    heater = np.repeat(rng.uniform(0.0, 6.0, 100), 50)
+    T, read = 295.0, []
+    for power, other in zip(heater, heat, strict=True):
+        read.append(T)
+        for _ in range(10):
+            above = T - 295.0
+            T += (power + other - 0.65 * above - convection * abs(above) ** 0.25 * above) / 130.0
+    outputs = np.array(read)[:, None] + 0.05 * rng.standard_normal((5000, 1))
+    return rt.Record(sample_time=10.0, inputs=heater, outputs=outputs, input_names=["heater"], output_names=["T"])
+
+
+def test_a_remainder_that_wanders_is_asked_of_a_part_of_a_long_log_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fits to 1500 samples leave less there than fits to all: they were compared with those, and all were refitted."""
+    asked: list[int] = []
+
+    def seen(records: list[rt.Record], *others: object) -> list[object]:
+        asked.append(len(records[0]))
+        return read_otherwise(records, *others)
+
+    monkeypatch.setattr(_other_log, "read_otherwise", seen)
+    found = rt.diagnose(BAR.with_parameters(TRUE), wandering(), parameters=UNKNOWN, effects=["sensor_lag", "radiation"])
+    assert found.verdict == "unexplained" and found.means == ""
+    assert asked == [1500]

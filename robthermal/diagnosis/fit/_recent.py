@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -37,6 +37,9 @@ class Recent(Generic[Value]):
                 del self._values[next(iter(self._values))]
             self._values[key] = compute()
         return self._values[key]
+
+    def __iter__(self) -> Iterator[Value]:
+        return iter(self._values.values())
 
     def keep_only(self, at: NDArray[np.float64]) -> None:
         """Forget the values at other arguments than this one.

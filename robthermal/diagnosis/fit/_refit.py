@@ -84,6 +84,15 @@ class Refit:
         """Whitened derivatives, (m, p)."""
         return Whitened(self.structure, self.whiteners).slopes(self.v)
 
+    def without_derivatives(self) -> None:
+        """Forget what has a row for every reading and a column for every unknown; it is computed again when asked for.
+
+        For fits that are kept to be compared, and may never be asked again: tens of megabytes each on long records.
+        """
+        self.structure.without_slopes()
+        for name in ("J", "basis"):
+            self.__dict__.pop(name, None)
+
     @cached_property
     def system(self) -> System:
         """Refitted system."""

@@ -282,6 +282,11 @@ class Structure:
         """
         self._last.keep_only(v)
 
+    def without_slopes(self) -> None:
+        """Forget derivatives: they are computed again where they are asked for."""
+        for computed in self._last:
+            computed.slopes = None
+
     def _unknowns(self, v: Array) -> Iterator[Unknowns]:
         """The unknowns as every data set sees them, without those whose derivatives are the same everywhere."""
         names, chain = self._chain(v)

@@ -129,6 +129,8 @@ def settled(before: Refit, entries: tuple[Entry, ...]) -> Accepted:
         own = fitted(winner.fit.structure, winner.fit.v, winner.fit.floor, winner.fit.levels)
         gain = next(e.delta_bic for e in entries if e.candidate.key == winner.candidate.key)
         winner = Entry(winner.candidate, own, gain, winner.p_value, winner.twins)
+    for entry in (*others, *beaten):
+        entry.fit.without_derivatives()
     return Accepted(before, best=winner, contenders=others, beaten=beaten)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -40,26 +40,36 @@ def revised(rounds: tuple[Accepted, ...], nominal: Refit, effects: Iterable[str]
     for sweep in range(_SWEEPS):
         changed = False
         for place in range(len(decisions) - 1 - (last_is_new and sweep == 0), -1, -1):
-            before = without(fit, place, nominal, decisions[place].before)
-            if before is None:
+            again = _chosen_again(decisions, fit, place, nominal, names)
+            if again is None:
                 continue
-            old = decisions[place].best
-            short = refit_short_list(before, score(before, names), length=_LENGTH, tried=old.candidate.key)
-            entries = _with_the_accepted(short.entries, replace(old, fit=fit), place, before)
-            if entries[0].delta_bic < BIC_GAP:
-                decisions.pop(place)
-                fit, changed = before, True
+            old = decisions.pop(place)
+            if isinstance(again, Refit):
+                fit, changed = again, True
                 break
-            decision = settled(before, entries)
             # the effect chosen again stands last in the new structure: keep the order of the decisions the same
-            decisions.append(decision)
-            decisions.pop(place)
-            fit = decision.best.fit
-            changed = changed or decision.best.candidate.key != old.candidate.key
+            decisions.append(again)
+            fit = again.best.fit
+            changed = changed or again.best.candidate.key != old.best.candidate.key
         if not changed:
             break
     kept, less = needed(tuple(decisions), fit, nominal)
     return revised(kept, nominal, names) if 0 < len(kept) < len(decisions) else (kept, less)
+
+
+def _chosen_again(rounds: Sequence[Accepted], fit: Refit, place: int, nominal: Refit, names: list[str] | None
+                  ) -> Accepted | Refit | None:
+    """One effect chosen again beside the others; the fit to them alone where none is needed; None without a fit."""
+    before = without(fit, place, nominal, rounds[place].before)
+    if before is None:
+        return None
+    old = rounds[place].best
+    short = refit_short_list(before, score(before, names), length=_LENGTH, tried=old.candidate.key)
+    entries = _with_the_accepted(short.entries, replace(old, fit=fit), place, before)
+    if entries[0].delta_bic < BIC_GAP:
+        return before
+    before.without_derivatives()
+    return settled(before, entries)
 
 
 def needed(rounds: tuple[Accepted, ...], fit: Refit, nominal: Refit) -> tuple[tuple[Accepted, ...], Refit]:

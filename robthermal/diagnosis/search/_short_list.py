@@ -278,6 +278,8 @@ def entry_of(origin: Origin, candidate: Candidate, size: float, p_value: float,
         new = _into_reach(origin.fit, new, best, promise)
     if in_reach(delta_bic(origin.fit, new), best):
         new = extended(new, new.structure, new.v, _FIRST)
+    else:
+        new.without_derivatives()
     return Entry(new.structure.effects[-1], new, delta_bic(origin.fit, new), p_value, twins)
 
 

@@ -76,15 +76,24 @@ def accept(state: SearchState) -> SearchState:
     ----------
     state : SearchState
         State from `refit_candidates`.
+
+    Returns
+    -------
+    SearchState
+        `short` is empty, and `current` that of the nominal fit until candidates are scored again.
     """
     decision = decide(state.short)
+    state = replace(state, short=ShortList(state.fit, (), {}))  # megabytes for every candidate of a long record
     if not isinstance(decision, Accepted):
         return replace(state, complete=True)
+    if state.rounds:  # the nominal fit is asked again
+        state.fit.without_derivatives()
     rounds, fit = (*state.rounds, decision), decision.best.fit
     if fit.structure.coarse:  # what a finer network changes depends on where the model is
+        fit.without_derivatives()
         fit = coarsened(fit)
     left = leaves_large_misfit(state.fit, decision.best) or (len(rounds) == MOST_EFFECTS and fit.variance > _LARGE)
-    return replace(state, rounds=rounds, fit=fit, complete=left, misfit_left=left)
+    return replace(state, current=state.scores, rounds=rounds, fit=fit, complete=left, misfit_left=left)
 
 
 def reconsider(state: SearchState) -> SearchState:
