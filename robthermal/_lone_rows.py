@@ -10,6 +10,7 @@ from ._rhythm import in_rhythm
 _APART = 4.0  # times what the two rows beside it differ by
 _LARGE = 0.05  # of the largest value of the column
 _RARE = 0.01  # of the rows; three at least
+_SHORT = 3  # samples of a short pulse
 
 
 def lone_rows(column: NDArray[np.float64]) -> NDArray[np.intp]:
@@ -23,8 +24,8 @@ def lone_rows(column: NDArray[np.float64]) -> NDArray[np.intp]:
     Returns
     -------
     ndarray of int
-        Such rows; none where they come in a rhythm, or are more than 1 % of the column (three at least), as in an
-        experiment with short pulses.
+        Such rows; none where they come in a rhythm, are more than 1 % of the column (three at least), or stand among
+        as many pulses of two or three samples (three at least), as in an experiment with short pulses.
 
     Examples
     --------
@@ -35,9 +36,11 @@ def lone_rows(column: NDArray[np.float64]) -> NDArray[np.intp]:
     array([40])
     """
     before, here, after = column[:-2], column[1:-1], column[2:]
-    off = np.minimum(np.abs(here - before), np.abs(here - after))
+    off, large = np.minimum(np.abs(here - before), np.abs(here - after)), _LARGE * np.max(np.abs(column), initial=0.0)
     same_side = (here - before) * (here - after) > 0.0
-    apart = (off > _APART * np.abs(after - before)) & (off > _LARGE * np.max(np.abs(column), initial=0.0))
+    apart = (off > _APART * np.abs(after - before)) & (off > large)
     rows = np.flatnonzero(same_side & apart) + 1
     rows = rows[~in_rhythm(rows, here[rows - 1] - before[rows - 1])]
-    return rows if rows.size <= max(3, _RARE * len(column)) else rows[:0]
+    held = np.diff(np.flatnonzero(np.abs(np.diff(column)) > large))  # from step to step
+    pulses = int(np.sum((held > 1) & (held <= _SHORT)))
+    return rows if rows.size <= max(3, _RARE * len(column)) and pulses < max(3, rows.size) else rows[:0]

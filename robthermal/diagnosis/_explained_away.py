@@ -1,7 +1,8 @@
-"""Effects that a finer network explains away, where they alone do nearly all that is to be done.
+"""Effects that do not last beside a finer network, where they alone do nearly all that is to be done, or far more.
 
 What a finer network would change has many unknowns, which can fit a body that loses heat somewhere else. An effect that
-needs none of them, and takes nearly all of the error off data that no fit has seen, is the better explanation.
+needs none of them, and takes nearly all of the error off data that no fit has seen, is the better explanation. Where a
+finer network leaves much more of the training records than the effects do, it explains nothing away.
 """
 
 from __future__ import annotations
@@ -11,15 +12,18 @@ from dataclasses import replace
 from ..errors import Diverged, InputError
 from ._judge import Judged, Validation
 from ._lasting import lasting
-from ._rivals import at_neighboring_lumps, with_rivals
+from ._rivals import CLOSED_SQUARE, at_neighboring_lumps, with_rivals
 from .evidence import Gap, expected_rms, left
-from .fit import Refit, exact
+from .fit import Refit, coarsened, exact
 from .search import SearchState
 
 _CLOSED = 0.92  # of the excess mean square, that an effect removes which needs no finer network
+_MISFIT = 2.0  # whitened variance that a finer network leaves, to explain nothing away
+_RENEWED = 3  # times
+_FAR_LESS = 0.5  # of the excess mean square that it leaves: no more may be left by the effects
 
 
-def predicting_alone(state: SearchState, validation: Validation) -> SearchState | None:
+def predicting_alone(state: SearchState, finer: Refit, validation: Validation) -> SearchState | None:
     """The effects found with the network as it is, with their rivals, where they alone predict; else None.
 
     A rival that leaves more could not be named itself, and is none, but for the same path at a neighboring lump.
@@ -28,6 +32,8 @@ def predicting_alone(state: SearchState, validation: Validation) -> SearchState 
     ----------
     state : SearchState
         Search with the network taken to be right.
+    finer : Refit
+        A finer network without any effect.
     validation : Validation
         Data that no fit has seen.
     """
@@ -35,12 +41,39 @@ def predicting_alone(state: SearchState, validation: Validation) -> SearchState 
         return None
     nominal = state.nominal
     kept = lasting(replace(state, misfit_left=False), nominal, validation)
-    if not kept.rounds or not _closes(kept.fit, nominal, validation):
+    if not kept.rounds:
+        return None
+    share = CLOSED_SQUARE if leaves_far_more(finer, kept.fit) else _CLOSED
+    if not _closes(kept.fit, nominal, validation, share):
         return None
     listed = with_rivals(kept, nominal, validation)
     return at_neighboring_lumps(replace(listed, rounds=tuple(
         replace(round_, contenders=tuple(entry for entry in round_.contenders
-                                         if _closes(entry.fit, nominal, validation))) for round_ in listed.rounds)))
+                                         if _closes(entry.fit, nominal, validation, share)))
+        for round_ in listed.rounds)))
+
+
+def leaves_far_more(finer: Refit, fit: Refit) -> bool:
+    """Whether a finer network without effects leaves a misfit, and far more of the training records than a fit does.
+
+    Parameters
+    ----------
+    finer : Refit
+        A finer network without any effect.
+    fit : Refit
+        With effects, and the network as it is.
+    """
+    plain = exact(fit)
+    noise = expected_rms(plain) ** 2
+
+    def more(one: Refit) -> bool:
+        return one.variance > _MISFIT and plain.rms**2 - noise < _FAR_LESS * (one.rms**2 - noise)
+
+    for _ in range(_RENEWED):  # what a finer network changes is linearized where it is fitted
+        if not more(finer):
+            return False
+        finer = coarsened(finer)
+    return more(finer)
 
 
 def saying_so(judged: Judged, finer: Refit) -> Judged:
@@ -55,13 +88,16 @@ def saying_so(judged: Judged, finer: Refit) -> Judged:
     """
     if judged.verdict not in ("named_with_remainder", "ambiguous"):
         return judged
-    text = (f"{judged.outcome.text} A network with its lumps split would explain the training records without it, with "
-            f"{finer.structure.n_coarse} more unknowns.")
+    plain, more = exact(judged.state.fit), f"with {finer.structure.n_coarse} more unknowns"
+    split = (f"A network with its lumps split, {more}, leaves {finer.rms:.2g} {finer.unit} of the training records, "
+             f"against {plain.rms:.2g} {plain.unit}." if leaves_far_more(finer, judged.state.fit) else
+             f"A network with its lumps split would explain the training records without it, {more}.")
+    text = f"{judged.outcome.text} {split}"
     return replace(judged, outcome=replace(judged.outcome, text=text))
 
 
-def _closes(fit: Refit, nominal: Refit, validation: Validation) -> bool:
-    """Whether nearly all of the excess mean square is gone, on training and on validation records."""
+def _closes(fit: Refit, nominal: Refit, validation: Validation, share: float) -> bool:
+    """Whether this share of the excess mean square is gone, on training and on validation records."""
     bare, plain = exact(nominal), exact(fit)
     gaps = [Gap(bare.rms, plain.rms, expected_rms(plain))]
     try:
@@ -69,4 +105,4 @@ def _closes(fit: Refit, nominal: Refit, validation: Validation) -> bool:
     except (Diverged, InputError):  # a model that runs away predicts nothing
         return False
     gaps += [] if held is None else [held.gap]
-    return all(left(gap).share_explained >= _CLOSED for gap in gaps)
+    return all(left(gap).share_explained >= share for gap in gaps)

@@ -76,7 +76,7 @@ def graded(judged: Judged, validation: Validation, progress: Progress) -> Judged
         elif len(state.rounds) > 1 and finer.structure.n_coarse:  # each was chosen before the others were known
             state = lasting(revise(replace(state, misfit_left=False)), finer, validation)
         if not state.rounds:
-            alone = predicting_alone(judged.state, validation) if finer.structure.n_coarse else None
+            alone = predicting_alone(judged.state, finer, validation) if finer.structure.n_coarse else None
             if alone is not None:
                 return saying_so(_graded(judged, alone, judged.state.nominal, validation), finer)
             return _nothing_lasts(judged, finer)

@@ -120,3 +120,47 @@ def test_an_irregular_step_later_on_is_refused_as_before(tmp_path: Path) -> None
     times = [float(k) + (0.4 if k == 30 else 0.0) for k in range(N)]
     with pytest.raises(InputError, match="the time steps deviate by up to 40 %"):
         rt.read_record(_log(tmp_path / "log.csv", times), **NAMES)
+
+
+@pytest.mark.parametrize(("unit", "per_second"), [("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
+def test_an_epoch_in_any_unit_is_told_by_its_size(tmp_path: Path, unit: str, per_second: float) -> None:
+    """Nanoseconds since 1970, as Python's `time_ns` and many data bases give them, were read as seconds."""
+    times = [int(1730907985.25 * per_second) + int(k * per_second) for k in range(N)]
+    for header in ("time,T1,I", "timestamp,T1,I"):
+        record = rt.read_record(_log(tmp_path / "log.csv", times, header), **NAMES)
+        _as_written(record)
+        format_, _, zero = str(record.imported).partition("time: ")[2].partition(", zero is ")
+        assert format_.endswith(f"epoch_{unit}")
+        assert abs(pd.Timestamp(zero) - pd.Timestamp("2024-11-06T15:46:25.25Z")) < pd.Timedelta("1us")
+    _as_written(rt.read_record(_log(tmp_path / "log.csv", times, "at,T1,I"), **NAMES, time="at",
+                               time_format=f"epoch_{unit}"))
+
+
+@pytest.mark.parametrize(("unit", "per_second"), [("us", 10**6), ("ns", 10**9)])
+def test_a_counter_without_a_unit_is_not_taken_for_seconds(tmp_path: Path, unit: str, per_second: int) -> None:
+    """Of a counter of nanoseconds a record with steps of 32 years was made."""
+    path = _log(tmp_path / "log.csv", [5 * per_second + k * per_second for k in range(N)])
+    with pytest.raises(InputError, match="'t' has no unit, and its steps are 1e\\+0.*time_format"):
+        rt.read_record(path, **NAMES)
+    _as_written(rt.read_record(path, **NAMES, time_format=unit))
+
+
+TURNS = [1.2 + 0.1 * (-1) ** k for k in range(N)]
+
+
+def test_of_two_columns_called_time_the_one_that_rises_is_taken(tmp_path: Path) -> None:
+    """A program that logs how long each turn of its loop took calls that `elapsed`."""
+    both = [f"{k},{turn}" for k, turn in enumerate(TURNS)]
+    record = rt.read_record(_log(tmp_path / "log.csv", both, "time,elapsed,T1,I"), **NAMES)
+    _as_written(record)
+    assert record.imported is not None
+    said = [action["text"] for action in record.imported.actions]
+    assert "time taken from 'time'; 'elapsed' does not increase" in said
+
+
+def test_a_time_for_every_sensor_and_none_for_the_row_is_asked_for(tmp_path: Path) -> None:
+    each = [f"{1730907985.0 + k},{1730907985.8 + k},{turn}" for k, turn in enumerate(TURNS)]
+    path = _log(tmp_path / "log.csv", each, "time_t1,time_t2,elapsed,T1,I")
+    with pytest.raises(InputError, match="'elapsed' is called a time and does not increase.*'time_t1', 'time_t2'"):
+        rt.read_record(path, **NAMES)
+    _as_written(rt.read_record(path, **NAMES, time="time_t1"))

@@ -12,11 +12,12 @@ from ...errors import InputError
 from ._channel import Channel, kept_factor
 from ._options import ImportOptions
 from ._table import Action, Array, Block, Table, spans
-from ._tokens import DECIMAL_COMMA, THOUSANDS, is_missing, short, thousands_of
+from ._tokens import DECIMAL_COMMA, SWITCH, THOUSANDS, is_missing, short, thousands_of
 from ._units import split_header
 
 _CODES = (-127.0, -127.94, 999.0, 9999.0, -999.0, 32767.0, 6553.5, 3276.7)
 _DOUBTED = 85.0  # what a DS18B20 says after power-up, and what a plate may have
+_DRIVES = ("input", "current")
 _JUMP = 10.0  # K or units: into the code, and back
 
 
@@ -31,13 +32,21 @@ class NumberReader:
         Column of the table.
     options : ImportOptions
         Import options, of which `missing` is used.
+    channel : Channel, optional
+        What the column is read as: of an input that is on or off the cells may be words.
     """
 
-    def __init__(self, table: Table, place: int, options: ImportOptions):
-        self._table, self.place = table, place
+    def __init__(self, table: Table, place: int, options: ImportOptions, channel: Channel | None = None):
+        self._table, self.place, self._channel = table, place, channel
+        self.n_words = 0  # True, False, on and off taken as 1 and 0
         self._words = {code.strip().lower() for code in options.missing if isinstance(code, str)}
         self.fault: tuple[int, InputError] | None = None  # the first cell that is no number: its line, and what is said
         self.n_faults = 0
+
+    @property
+    def header(self) -> str:
+        """Of the column."""
+        return self._table.headers[self.place]
 
     def read(self, block: Block) -> Array:
         """Cells as they are written, nan where missing; the first that is no number is remembered."""
@@ -51,12 +60,32 @@ class NumberReader:
             text = str(cell).strip()
             if is_missing(text) or text.lower() in self._words:
                 continue
+            if self._channel is not None and _switched(self._channel) and text.lower() in SWITCH:
+                values[row] = SWITCH[text.lower()]
+                self.n_words += 1
+                continue
             try:
-                values[row] = _number(self._table, int(block.lines[row]), self._table.headers[self.place], text)
+                values[row] = _number(self._table, int(block.lines[row]), self.header, text)
             except InputError as error:
+                error = _of_a_switch(error, self._channel, self.header, text) or error
                 self.fault = self.fault or (int(block.lines[row]), error)
                 self.n_faults += 1
         return values
+
+
+def _switched(channel: Channel) -> bool:
+    """Whether 1 of a drive has a meaning: what it is when on was declared, or its unit is its own."""
+    return channel.role in _DRIVES and (channel.scaled or channel.unit not in ("W", "A", ""))
+
+
+def _of_a_switch(error: InputError, channel: Channel | None, header: str, text: str) -> InputError | None:
+    """What to declare of a heater or current whose cells are on and off, and of which nobody says how much on is."""
+    if channel is None or channel.role not in _DRIVES or text.lower() not in SWITCH:
+        return None
+    kept = channel.unit or "its value"
+    example = f'{channel.name} = {{ column = "{header}", scale = ({kept} when on) }}'
+    return InputError(error.what, where=error.where, expected="a number in every cell, or what on means",
+                      remedy=f"Write [columns] {example}: True and on are then 1, False and off 0.")
 
 
 def refuse_faults(readers: Sequence[NumberReader]) -> None:
@@ -212,6 +241,12 @@ def mapped_actions(table: Table, channels: Sequence[Channel], of_means: bool) ->
         elif c.unit_read is not None and c.unit_read.name != c.unit and c.unit:
             found.append(Action("converted", len(table.lines), f"{c.name} from {c.unit_read.name} to {c.unit}", header))
     return found
+
+
+def words_taken(readers: Sequence[NumberReader]) -> list[Action]:
+    """What is said of cells that were words of a switch."""
+    return [Action("converted", reader.n_words, f"{header!r}: True and on taken as 1, False and off as 0", header)
+            for reader in readers if reader.n_words for header in [reader.header]]
 
 
 def from_thermistor(table: Table, channel: Channel, raw: Array) -> None:

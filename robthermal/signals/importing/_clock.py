@@ -37,6 +37,8 @@ _NAMES = (
     "microseconds",
 )  # with a blank for every "/", "_", "-" and "&"
 _COUNTERS = {"millis": "ms", "milliseconds": "ms", "micros": "us", "microseconds": "us"}  # their own unit
+_TIMES = re.compile(r"(time|date|stamp|millis|micros|seconds|zeit)")
+_FALLING = 0.2  # of the steps
 _PAIRS = (("date", "time"), ("datum", "uhrzeit"), ("datum", "zeit"))
 
 
@@ -71,6 +73,14 @@ def time_columns(table: Table, options: ImportOptions, wanted: frozenset[str]) -
         if all(len(found) == 1 for found in both):
             return (both[0][0], both[1][0])
     found = [k for k in free if names[k] in _NAMES]
+    rising = [k for k in found if not _falls(table.columns[k])]
+    if len(rising) == 1 and len(found) > 1:  # "elapsed" of a loop says how long each turn took
+        others = ", ".join(repr(table.headers[k]) for k in found if k not in rising)
+        text = f"time taken from {table.headers[rising[0]]!r}; {others} does not increase"
+        table.actions.append(Action("mapped", 1, text, table.headers[rising[0]]))
+        return (rising[0],)
+    if len(found) == 1 and not rising:
+        _refuse_falling(table, found[0], [k for k in free if _TIMES.match(names[k]) and _rises(table.columns[k])])
     if len(found) > 1:  # "T" is a temperature where anything else can be the time
         found = [k for k in found if split_header(table.headers[k])[0].strip() != "T"]
     if len(found) == 1:
@@ -96,6 +106,15 @@ def time_columns(table: Table, options: ImportOptions, wanted: frozenset[str]) -
         expected="one time column",
         remedy=f'Write time = "{table.headers[found[0]]}", or another of them.',
     )
+
+
+def _refuse_falling(table: Table, place: int, others: list[int]) -> None:
+    """Refuse a column called time that falls again and again, where other columns of that name rise."""
+    if others:
+        header, listed = table.headers[place], ", ".join(repr(table.headers[k]) for k in others)
+        raise InputError(f"column {header!r} is called a time and does not increase", where=table.where,
+                         expected="a time that increases",
+                         remedy=f'Write time = "{table.headers[others[0]]}"; these increase: {listed[:200]}.')
 
 
 def _by_its_cells(table: Table, options: ImportOptions, free: list[int]) -> tuple[int, ...]:
@@ -172,6 +191,14 @@ def _rises(cells: Any) -> bool:
         return False
     there = cells[np.isfinite(cells)]
     return len(there) > 1 and bool(np.all(np.diff(there) > 0))
+
+
+def _falls(cells: Any) -> bool:
+    """Whether many of the first cells are smaller than the one before: no time, nor a counter that starts again."""
+    if getattr(getattr(cells, "dtype", None), "kind", "") != "f":
+        return False
+    steps = np.diff(cells[np.isfinite(cells)])
+    return len(steps) > 2 and float(np.mean(steps <= 0)) > _FALLING
 
 
 def _in_seconds(header: str) -> bool:

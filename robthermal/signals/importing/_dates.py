@@ -13,7 +13,19 @@ from ...errors import InputError
 from ._options import ImportOptions
 from ._proposals import time_format_of
 from ._table import Block, Table
-from ._times import CLOCK, DURATION, NUMERIC, CellReader, Clock, Durations, Numbers, TimeReader, TimesOfDay, texts_of
+from ._times import (
+    CLOCK,
+    DURATION,
+    EPOCHS,
+    NUMERIC,
+    CellReader,
+    Clock,
+    Durations,
+    Numbers,
+    TimeReader,
+    TimesOfDay,
+    texts_of,
+)
 from ._tokens import NUMBER, short
 from ._zones import since_first
 
@@ -54,7 +66,7 @@ def stamp_reader(
     if isinstance(cells, pd.DatetimeIndex):
         return DateCells(table, places, options)
     pattern = declared is not None and "%" in declared
-    if cells.dtype.kind == "f" and not pattern or declared in (*NUMERIC, "epoch_s", "epoch_ms", "excel"):
+    if cells.dtype.kind == "f" and not pattern or declared in (*NUMERIC, *EPOCHS, "excel"):
         return Numbers(table, places, most, unit, options)
     first = _first(cells, declared)
     if declared is None and NUMBER.fullmatch(first):  # numbers, but for some cells

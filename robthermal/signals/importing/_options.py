@@ -69,8 +69,8 @@ class ImportOptions(_Table):
     time : str or tuple of str, optional
         Header of the time column, or of date and time of day.
     time_format : str, optional
-        "iso", "s", "ms", "us", "min", "h", "epoch_s", "epoch_ms", "excel", "elapsed", or a pattern such as
-        "%d.%m.%Y %H:%M:%S".
+        "iso", "s", "ms", "us", "ns", "min", "h", "epoch_s", "epoch_ms", "epoch_us", "epoch_ns", "excel", "elapsed", or
+        a pattern such as "%d.%m.%Y %H:%M:%S".
     timezone : str, optional
         Zone of stamps without one, for example "Europe/Berlin".
     sample_time : float, optional

@@ -20,10 +20,12 @@ from ._wraps import counted_on
 from ._zones import from_days, since_first
 
 DAY = 86400.0
-NUMERIC = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0}
+NUMERIC = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 CLOCK = re.compile(r"\d{1,5}:\d{2}(:\d{2}([.,]\d+)?)?")
 DURATION = re.compile(r"([+-]?\d+(?:[.,]\d+)?)\s*([a-zA-Z]+)")
-_EPOCHS = {"epoch_s": (1e9, 2e9), "epoch_ms": (1e12, 2e12)}
+EPOCHS = {"epoch_s": 1.0, "epoch_ms": 1e-3, "epoch_us": 1e-6, "epoch_ns": 1e-9}
+_FIRST, _LAST = 1e9, 2e9  # s after 1970: 2001 to 2033
+_NO_SECONDS = 1e6  # s, eleven days: no thermal log has steps that long
 
 
 @dataclass(frozen=True)
@@ -183,22 +185,34 @@ class Numbers(CellReader):
         if declared == "excel":
             return Clock(*since_first(self.table, self.header, from_days(values), self._options), "excel")
         factor, name = _unit_of_time(self.table, self.header, self._unit)
-        epoch = declared if declared in _EPOCHS else None
+        epoch = declared if declared in EPOCHS else None
         if epoch is None and declared is None and not name and len(values) > 1:
             low, high = values.min(), values.max()
-            epoch = next((key for key, (a, b) in _EPOCHS.items() if a <= low and high <= b), None)
+            epoch = next((key for key, scale in EPOCHS.items() if _FIRST <= low * scale <= high * scale <= _LAST), None)
         if epoch is not None:
-            scale = 1.0 if epoch == "epoch_s" else 1e-3
-            origin = pd.Timestamp(round(float(values[0]) * scale * 1e9), tz="UTC").isoformat()
+            scale = EPOCHS[epoch]
+            whole, part = divmod(float(values[0]), 1.0)
+            ticks = round(1e9 * scale)  # in nanoseconds; their product is no number of 53 bits
+            origin = pd.Timestamp(int(whole) * ticks + round(part * ticks), tz="UTC").isoformat()
             values -= float(values[0])
             return Clock(values * scale if scale != 1.0 else values, origin, epoch)
         if declared is not None:
             raise InputError(
                 f"holds numbers and time_format is {declared!r}",
                 where=f"{self.table.where}, column {self.header!r}",
-                expected='a format of numbers: "s", "ms", "us", "min", "h", "epoch_s", "epoch_ms" or "excel"',
+                expected=f"a format of numbers: {', '.join((*NUMERIC, *EPOCHS))} or excel",
             )
+        if not name:
+            self._refuse_long_steps(values)
         return Clock(values * factor if factor != 1.0 else values, None, name or "s")
+
+    def _refuse_long_steps(self, values: Array) -> None:
+        """Refuse a counter that nobody calls one: as seconds its steps would be weeks or years."""
+        step = float(np.median(np.diff(values))) if len(values) > 1 else 0.0
+        if step >= _NO_SECONDS:
+            raise InputError(f"the time column {self.header!r} has no unit, and its steps are {step:.4g}",
+                             where=self.table.where, expected="seconds, or a declared unit",
+                             remedy='Declare it: time_format = "us" or "ns", or "s" if these are seconds.')
 
 
 def _unit_of_time(table: Table, header: str, unit: str | None) -> tuple[float, str]:

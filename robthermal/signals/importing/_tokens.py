@@ -40,6 +40,7 @@ MISSING = (
     "-1.#ind",
     "1.#qnan",
 )
+SWITCH = {"true": 1.0, "false": 0.0, "on": 1.0, "off": 0.0}  # of an input that is on or off
 NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 DECIMAL_POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")

@@ -46,6 +46,7 @@ def _known() -> dict[str, Unit]:
         "s": ("time", 1.0, "s sec secs second seconds sek"),
         "ms": ("time", 1e-3, "ms msec millisecond milliseconds"),
         "us": ("time", 1e-6, "us µs μs usec microsecond microseconds"),
+        "ns": ("time", 1e-9, "ns nsec nanosecond nanoseconds"),
         "min": ("time", 60.0, "min mins minute minutes"),
         "h": ("time", 3600.0, "h hr hrs hour hours"),
         "A": ("current", 1.0, "A amp amps ampere"),

@@ -10,7 +10,16 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from .._plausible import check_temperature, limit_notes
-from ._cells import NumberReader, from_thermistor, mapped_actions, refuse_codes, refuse_faults, take_codes, to_si
+from ._cells import (
+    NumberReader,
+    from_thermistor,
+    mapped_actions,
+    refuse_codes,
+    refuse_faults,
+    take_codes,
+    to_si,
+    words_taken,
+)
 from ._channel import Channel
 from ._columns import SystemLike
 from ._jitter import settled
@@ -89,11 +98,12 @@ def read_values(
     ordered = tuple(c for inputs in (True, False) for c in channels if (c.role in _INPUTS) == inputs)
     n_in = sum(c.role in _INPUTS for c in ordered)
     U, Y = np.empty((source.most_rows, n_in)), np.empty((source.most_rows, len(ordered) - n_in))
-    readers = [NumberReader(table, c.place, choice.record) for c in ordered]
+    readers = [NumberReader(table, c.place, choice.record, c) for c in ordered]
     n = fill(source, times, readers, [_column(ordered, U, Y, c) for c in ordered])
     U, Y = U[:n], Y[:n]
     clock = times.clock()
     refuse_faults(readers)
+    table.actions.extend(words_taken(readers))
     table.actions.extend(mapped_actions(table, ordered, choice.record.averaged in ("before", "after")))
     values = Values(ordered, U, Y, {}, {})
     for channel in ordered:
