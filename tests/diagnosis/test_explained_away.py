@@ -102,5 +102,5 @@ def test_what_lumps_do_not_hold_alone_closes_too_little(seed):
 
 def test_nothing_found_or_nothing_to_predict_is_no_name():
     fit, one = nominal(*LOST), stack(*LOST)
-    assert predicting_alone(begin(fit, EFFECTS), Validation(one.unseen)) is None
-    assert predicting_alone(begin(fit, EFFECTS), Validation(None)) is None
+    assert predicting_alone(begin(fit, EFFECTS), finer(*LOST), Validation(one.unseen)) is None
+    assert predicting_alone(begin(fit, EFFECTS), finer(*LOST), Validation(None)) is None
