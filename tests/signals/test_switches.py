@@ -50,10 +50,12 @@ def test_a_frame_of_truth_values(tmp_path: Path) -> None:
     assert record["heat"].tolist() == (120.0 * ON).tolist()
 
 
-def test_an_input_of_its_own_unit_takes_them(tmp_path: Path) -> None:
-    system = box(', unit = "state", gain = 80.0')
-    record = rt.read_record(logged(tmp_path, ("off", "on"), "heat"), system)
-    assert record["heat"].tolist() == ON.tolist()
+def test_on_is_not_one_per_cent(tmp_path: Path) -> None:
+    system, path = box(', unit = "%", gain = 1.2'), logged(tmp_path, ("off", "on"), "heat")
+    with pytest.raises(rt.InputError, match="scale = \\(% when on\\)"):
+        rt.read_record(path, system)
+    record = rt.read_record(path, system, columns={"heat": {"column": "heat", "scale": 100.0}})
+    assert record["heat"].tolist() == (100.0 * ON).tolist()
 
 
 def test_on_without_a_power_is_refused_with_what_to_write(tmp_path: Path) -> None:

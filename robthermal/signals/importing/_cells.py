@@ -74,8 +74,8 @@ class NumberReader:
 
 
 def _switched(channel: Channel) -> bool:
-    """Whether 1 of a drive has a meaning: what it is when on was declared, or its unit is its own."""
-    return channel.role in _DRIVES and (channel.scaled or channel.unit not in ("W", "A", ""))
+    """Whether what a drive is when on was declared: in per cent, 1 would be next to nothing."""
+    return channel.role in _DRIVES and channel.scaled
 
 
 def _of_a_switch(error: InputError, channel: Channel | None, header: str, text: str) -> InputError | None:
