@@ -8,6 +8,7 @@ finer network leaves much more of the training records than the effects do, it e
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 from ..errors import Diverged, InputError
 from ._judge import Judged, Validation
@@ -72,7 +73,7 @@ def leaves_far_more(finer: Refit, fit: Refit) -> bool:
     for _ in range(_RENEWED):  # what a finer network changes is linearized where it is fitted
         if not more(finer):
             return False
-        finer = coarsened(finer)
+        finer = finer.kept("renewed", partial(coarsened, finer))
     return more(finer)
 
 
