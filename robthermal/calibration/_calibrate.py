@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-import scipy
 from threadpoolctl import threadpool_limits
 
 from .._arrays import Floats
-from ..errors import Diverged, InputError
 from ..fitting import (
     Choice,
     Data,
@@ -20,12 +18,10 @@ from ..fitting import (
     MeasuredResponse,
     Problem,
     Start,
-    Weigh,
     as_data,
     chosen_ranges,
     counted,
     declared_noise,
-    estimated_noise,
     free_run,
     initial_of,
     measured_of,
@@ -35,9 +31,6 @@ from ..fitting import (
     refuse_same,
     refuse_short,
     rmse,
-    scaled,
-    scipy_loss,
-    smallest_noise,
     without_steps,
 )
 from ..signals import Record
@@ -45,13 +38,13 @@ from ..thermal import System
 from ._directions import in_words, named, weights
 from ._estimates import outcome_of
 from ._fit import Fit
-from ._innovations import has_disturbance, whitener
+from ._innovations import has_disturbance
 from ._joint import JointProblem
+from ._other_optimum import with_exchanged_lags
 from ._outcomes import CalibrationCode
 from ._refusals import (
     check_options,
     refuse_double_start,
-    refuse_idle,
     refuse_idle_options,
     refuse_same_response,
     refuse_unknown_noise,
@@ -60,13 +53,10 @@ from ._remarks import remarks_of
 from ._response_comparison import comparison_of
 from ._response_model import ResponseProblem
 from ._score import score_of
+from ._solution import Solution, from_rest, solve
 from ._whiteness import whiteness_of
 
 Method = Literal["output_error", "prediction_error"]
-_CLEAR = 10.0  # of BIC
-_ROUNDS = 8  # of noise estimation
-_SETTLED = 0.01  # relative change of the noise levels
-_STILL = 1e-3  # change of the parameters between two filters, in `Ranges.unit`
 
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # products are small: threads only wait for each other
@@ -167,93 +157,24 @@ def calibrate(system: System, data: Measured | Sequence[Measured], *, parameters
     filtered = method == "prediction_error" and has_disturbance(system)
     if filtered:
         refuse_unknown_noise(levels)
-    solution = _from_rest(problem, lambda one: _solve(one, levels, loss, max_iterations, filtered))
+    solution = from_rest(problem, lambda one: solve(one, levels, loss, max_iterations, filtered))
+    solution, either = with_exchanged_lags(
+        solution, loss, lambda one, v: solve(one, levels, loss, max_iterations, filtered, v))
     said = " ".join([*rows.said, *rows.doubted])
     if training and not responses:
         def fitted(others: list[Record]) -> float:
             data = as_data(system, others, "data")
             starts = [initial_of(system, one, initial) for one in data]
             again = JointProblem(Problem(system, data, ranges, starts), ())
-            return _rms(_from_rest(again, lambda one: _solve(one, levels, loss, max_iterations, filtered)))
+            return _rms(from_rest(again, lambda one: solve(one, levels, loss, max_iterations, filtered)))
 
         left = _rms(solution)
         said = " ".join(filter(None, [said, misread(system, training, left, left, levels, fitted)]))
-    return _result(solution, held_out, compared, initial, loss, said)
-
-
-@dataclass(frozen=True)
-class Solution:
-    """Where the optimizer ended: the problem as weighed last, unknowns, noise levels, its status and iterations."""
-
-    problem: JointProblem
-    v: Floats
-    noise: dict[str, float]
-    converged: bool
-    iterations: int
-
-
-def _from_rest(problem: JointProblem, solved: Callable[[JointProblem], Solution]) -> Solution:
-    """With settled lags at the start of the records, unless these ask for more beyond doubt (by BIC)."""
-    starts = [start.at_rest for start in problem.records.starts]
-    settled = solved(replace(problem, records=replace(problem.records, starts=starts)))
-    more = problem.records.v0.size - settled.v.size
-    if not more:
-        return settled
-    free = solved(problem)
-    records = replace(settled.problem.records, weigh=free.problem.records.weigh)  # the same weights for both
-    costs = [float(np.sum(one.vector(v) ** 2)) for one, v in ((replace(settled.problem, records=records), settled.v),
-                                                              (free.problem, free.v))]
-    return free if costs[0] - costs[1] > more * (np.log(problem.n_numbers) + _CLEAR) else settled
-
-
-def _solve(problem: JointProblem, declared: dict[str, float], loss: Loss, max_iterations: int, filtered: bool
-           ) -> Solution:
-    """Minimize; weights that depend on the fit (an undeclared noise, a filter) are renewed and the fit repeated."""
-    unknown, records = [name for name, level in declared.items() if not level], problem.records
-    v = records.v0
-    noise = dict(declared) | _levels(records, v, unknown, loss)
-    refuse_idle(problem, v)
-    # of the cost: a small part of its own scatter; differences of a response are cheap and exact enough for more
-    left, enough = max_iterations, 1e-9 if problem.responses else min(1e-6, 0.01 / problem.n_numbers)
-    p, several = len(problem.ranges.names), problem.several
-    for number in range(_ROUNDS):
-        records.weigh = _weights(records, v, noise, filtered)
-        if several:  # by size first, from wherever the start is; then by combinations, which need to be near
-            problem = problem.weighed(v, combined=number > 0)
-        run = scipy.optimize.least_squares(problem.vector, v, problem.jacobian, bounds=records.bounds, x_scale="jac",
-                                           loss=scipy_loss(loss, records.n_readings), max_nfev=left, ftol=enough,
-                                           xtol=1e-9, gtol=1e-9)
-        moved = np.abs(run.x - v)[:p] / problem.ranges.unit
-        v, left = run.x, left - run.nfev
-        new = _levels(records, v, unknown, loss)
-        settled = all(abs(new[name] / noise[name] - 1.0) < _SETTLED for name in unknown)
-        settled = settled and not ((filtered or several) and moved.max() > _STILL)
-        if settled and (number or not several) or left < 1 or run.status == 0:
-            break
-        noise |= new
-    return Solution(problem, v, noise, bool(run.status > 0 and settled), max_iterations - left)
-
-
-def _weights(problem: Problem, v: Floats, noise: dict[str, float], filtered: bool) -> list[Weigh]:
-    levels = [np.array([noise[name] for name in one.sensors]) for one in problem.data]
-    if not filtered:
-        return [scaled(level) for level in levels]
-    systems = problem.systems(v)
-    return [whitener(system, one, level) for system, one, level in zip(systems, problem.data, levels, strict=True)]
-
-
-def _levels(problem: Problem, v: Floats, unknown: list[str], loss: Loss) -> dict[str, float]:
-    try:
-        residuals = problem.residuals(v)
-    except Diverged as error:
-        raise InputError(f"the model runs away at the starting values: {error}", where="argument system",
-                         remedy="Start closer to the truth: system.with_parameters({...}).") from None
-    return {name: estimated_noise(problem.data, residuals, name, loss, smallest_noise(problem.system, name))
-            for name in unknown}
+    return _result(solution, held_out, compared, initial, loss, (said, either))
 
 
 def _result(solution: Solution, held_out: list[Data], compared: list[MeasuredResponse], initial: Start, loss: Loss,
-            said: str) -> Fit:
+            said: tuple[str, ...]) -> Fit:
     joint, v = solution.problem, solution.v
     problem, ranges = joint.records, joint.ranges
     values = problem.parameters(v)
@@ -287,7 +208,7 @@ def _result(solution: Solution, held_out: list[Data], compared: list[MeasuredRes
         responses=tuple(comparison_of(system, part.one) for part in joint.responses),
         validation_responses=tuple(comparison_of(system, one) for one in compared),
         iterations=solution.iterations,
-        outcome=CalibrationCode.CONVERGED.outcome(), remarks=(*filter(None, [said]), *remarks_of(joint, v)),
+        outcome=CalibrationCode.CONVERGED.outcome(), remarks=(*filter(None, said), *remarks_of(joint, v)),
     )
     return replace(fit, outcome=outcome_of(fit, solution.converged))
 

@@ -30,6 +30,9 @@ class Found:
     augmented : dict
         Quantity to its value in the augmented system, where something is left: `values` are then those beside what a
         finer network would change, and the augmented system is fitted without that. Empty where both are the same.
+    either : dict
+        Quantity to another value with which the records are explained as well: a lag that may change places with the
+        time constant of its lump. Empty where the records tell.
     """
 
     effect: str
@@ -39,6 +42,7 @@ class Found:
     delta_bic: float
     evidence: Evidence | None = None
     augmented: dict[str, float] = field(default_factory=dict)
+    either: dict[str, float] = field(default_factory=dict)
 
     @property
     def key(self) -> Name:
@@ -49,6 +53,13 @@ class Found:
     def label(self) -> str:
         """For tables: ``sensor_lag(T6)``."""
         return f"{self.effect}({', '.join(self.where)})"
+
+    @property
+    def quantities(self) -> str:
+        """For tables: ``time_constant = 29.9 ± 0.4 s (or 200 s)``."""
+        return ", ".join(f"{name} = {value:.4g} ± {std:.2g} {unit}"
+                         + (f" (or {self.either[name]:.3g} {unit})" if name in self.either else "")
+                         for name, (value, std, unit) in self.values.items())
 
     def to_dict(self) -> dict[str, Any]:
         """What ``diagnosis.json`` holds of an effect.
@@ -62,5 +73,6 @@ class Found:
                                          "stability": vars(one.stability)}
         return {"effect": self.effect, "where": list(self.where), "p_value": self.p_value, "delta_bic": self.delta_bic,
                 **graded, **({"augmented": self.augmented} if self.augmented else {}),
+                **({"either": self.either} if self.either else {}),
                 "parameters": {name: {"value": value, "std": std, "unit": unit}
                                for name, (value, std, unit) in self.values.items()}}

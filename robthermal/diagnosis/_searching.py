@@ -9,7 +9,7 @@ import numpy as np
 
 from ._judge import Progress, Validation
 from .evidence import promised, validation_data
-from .fit import Refit, coarsened, extended
+from .fit import Refit, coarsened, extended, leaves_far_less
 from .search import (
     Accepted,
     SearchState,
@@ -18,6 +18,7 @@ from .search import (
     beside,
     compare,
     exchange,
+    from_slow_thermometer,
     reconsider,
     refit_candidates,
     revise,
@@ -115,6 +116,19 @@ def accepted_effects(state: SearchState, progress: Progress, known: Accepted | N
     known : Accepted, optional
         Effect found before, on the same nominal system; it is a candidate of the first round.
     """
+    found = _added(state, progress, known)
+    if _noise_only(found.fit):
+        return found
+    begun = from_slow_thermometer(found)
+    if begun is None:
+        return found
+    progress("searching again from thermometers slower than the lumps that they read")
+    other = _added(begun, progress)
+    return other if leaves_far_less(other.fit, found.fit) else found
+
+
+def _added(state: SearchState, progress: Progress, known: Accepted | None = None) -> SearchState:
+    """Add effects one by one while any is beyond doubt."""
     again = False
     while not state.complete or (state.misfit_left and not again):
         if state.complete:

@@ -30,6 +30,7 @@ from ._doubts import (
     within_the_body,
 )
 from ._each_record import asked_of_each
+from ._either_way import either_way, either_way_in_words
 from ._finer_network import unless_finer
 from ._found import Found
 from ._graded import graded, lasting_beyond_steps
@@ -61,7 +62,7 @@ from .evidence import (
     remainder,
     unknown_heat,
 )
-from .fit import Refit, SessionGain, exact, found_ambients, only_heated, refit, too_warm
+from .fit import Refit, SessionGain, exact, found_ambients, lag_name, only_heated, refit, too_warm
 from .plan import NextExperiment, next_experiment, resolving, rivals, trial_conditions
 from .search import Accepted, SearchState, quantities_of
 
@@ -261,7 +262,8 @@ def concluded(judged: Judged, trained: str = "training records") -> Diagnosis:
     named = judged.verdict in ("named", "named_with_remainder", "ambiguous")
     unexplained = judged.verdict == "unexplained" and bool(nominal.records)
     fit = judged.plain or (exact(state.fit) if unexplained else state.fit)
-    found = _all_found(judged, named)
+    others = either_way(state.fit, judged.verdict)
+    found = _all_found(judged, named, others)
     gap = {"train": Gap(nominal.rms, fit.rms, expected_rms(fit), fit.unit)}
     if judged.hold_out is not None:
         gap["validation"] = judged.hold_out.gap
@@ -280,7 +282,7 @@ def concluded(judged: Judged, trained: str = "training records") -> Diagnosis:
         nearest=nearest(judged, gap),
         unknown_heat=unknown_heat(nominal, where.lump) if unexplained else None, remainder=rest, resolving=resolves,
         ambients=found_ambients(fit), means=judged.means)
-    caveats = _caveats(judged, diagnosis)
+    caveats = (*either_way_in_words(state.fit, others), *_caveats(judged, diagnosis))
     return replace(diagnosis, caveats=caveats, outcome=replace(judged.outcome, text=_text(diagnosis, caveats)))
 
 
@@ -331,13 +333,12 @@ def _beyond_noise(fit: Refit, gap: dict[str, Gap], trained: str) -> Remainder | 
     return remainder(fit, gap, trained) if any(left(one).rms for one in gap.values()) else None
 
 
-def _all_found(judged: Judged, named: bool) -> tuple[Found, ...]:
+def _all_found(judged: Judged, named: bool, others: Mapping[str, float]) -> tuple[Found, ...]:
     """Accepted effects; named ones with the evidence for each."""
     state, evidence = judged.state, judged.evidence
     if named and not evidence:
         evidence = evidence_of(state.rounds, state.fit, state.nominal)
-    return tuple(_found(judged, i, evidence[i] if named else None)
-                 for i, round_ in enumerate(state.rounds))
+    return tuple(_found(judged, i, evidence[i] if named else None, others) for i in range(len(state.rounds)))
 
 
 def _hidden(state: SearchState) -> dict[Name, str]:
@@ -347,19 +348,19 @@ def _hidden(state: SearchState) -> dict[Name, str]:
             if c.key not in tested and (why := state.nominal.structure.hides(c))}
 
 
-def _found(judged: Judged, place: int, evidence: Evidence | None) -> Found:
+def _found(judged: Judged, place: int, evidence: Evidence | None, others: Mapping[str, float]) -> Found:
     fit, plain, best = judged.state.fit, judged.plain, judged.state.rounds[place].best
     values, augmented = quantities_of(fit, place), {}
     if plain is not None:
         values = _with_remainder(fit, None if judged.compared else plain, place, values)
         if fit.structure.coarse:
             augmented = {name: value for name, (value, _) in quantities_of(plain, place).items()}
-    units = {q.name: q.unit for q in best.candidate.effect.quantities}
+    units, lag = {q.name: q.unit for q in best.candidate.effect.quantities}, lag_name(*best.candidate.key)
     said = {name: (value, std, units[name]) for name, (value, std) in values.items()}
     if best.candidate.effect.name == NAME:
         said = relative(said)
     return Found(best.candidate.effect.name, best.candidate.where, said, best.p_value, best.delta_bic, evidence,
-                 augmented)
+                 augmented, {"time_constant": others[lag]} if lag in others else {})
 
 
 def _with_remainder(fit: Refit, plain: Refit | None, place: int, values: dict[str, tuple[float, float]]

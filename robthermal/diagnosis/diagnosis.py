@@ -123,9 +123,8 @@ class Diagnosis:
     def __str__(self) -> str:
         lines = [f"verdict: {self.verdict}"]
         for found, others in zip(self.effects, self.alternatives, strict=True):
-            lines.append(f"  {found.label}: " + ", ".join(
-                f"{name} = {value:.4g} ± {std:.2g} {unit}" for name, (value, std, unit) in found.values.items())
-                + f"   ΔBIC {found.delta_bic:.1f}, {probability(found.p_value)}")
+            lines.append(f"  {found.label}: {found.quantities}   ΔBIC {found.delta_bic:.1f}, "
+                         f"{probability(found.p_value)}")
             lines += [f"    or {effect}({', '.join(where)})" for effect, where in others]
         for name, gap in self._gaps():
             lines.append(f"{name}: rms {gap.before:.4g} before, {gap.after:.4g} after, {gap.noise:.4g} noise "
@@ -137,9 +136,7 @@ class Diagnosis:
 
     def _repr_html_(self) -> str:
         rows: list[tuple[str, str]] = [("verdict", self.verdict)]
-        for found in self.effects:
-            values = (f"{name} = {value:.4g} ± {std:.2g} {unit}" for name, (value, std, unit) in found.values.items())
-            rows.append((found.label, ", ".join(values)))
+        rows += [(found.label, found.quantities) for found in self.effects]
         rows += [(f"rms, {name}", f"{gap.before:.4g} before, {gap.after:.4g} after, {gap.noise:.4g} noise [{gap.unit}]")
                  for name, gap in self._gaps()]
         return short_table("Diagnosis", rows, str(self.outcome))

@@ -30,6 +30,7 @@ from ._short_list import beside as beside
 from ._short_list import leaves_large_misfit as leaves_large_misfit
 from ._short_list import quantities_of as quantities_of
 from ._short_list import refit_short_list as refit_short_list
+from ._slow_thermometer import from_slow_thermometer as from_slow_thermometer
 from ._stages import accept as accept
 from ._stages import begin as begin
 from ._stages import compare as compare
@@ -44,7 +45,8 @@ from ._wider_noise import with_wider_noise as with_wider_noise
 
 __all__ = ["ALIKE", "Accepted", "Decision", "EffectSet", "Entry", "JointCheck", "JointSelection", "SearchState",
            "ShortList", "accept", "begin", "beside", "between_trials", "checked_jointly", "compare", "decide",
-           "exchange", "implausible_names", "leaves_large_misfit", "needed", "one_place", "other_periods",
-           "other_thermometers", "quantities_of", "reconsider", "refit_candidates", "refit_set", "refit_short_list",
-           "resolve_alternatives", "resolve_places", "revise", "revised", "ruled_out", "select_jointly", "shortlist",
-           "validate", "with_neighbors", "with_other_end", "with_wider_noise", "without", "without_contradicted"]
+           "exchange", "from_slow_thermometer", "implausible_names", "leaves_large_misfit", "needed", "one_place",
+           "other_periods", "other_thermometers", "quantities_of", "reconsider", "refit_candidates", "refit_set",
+           "refit_short_list", "resolve_alternatives", "resolve_places", "revise", "revised", "ruled_out",
+           "select_jointly", "shortlist", "validate", "with_neighbors", "with_other_end", "with_wider_noise",
+           "without", "without_contradicted"]

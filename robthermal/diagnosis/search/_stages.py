@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from ..data import DataSet
 from ..evidence import BIC_GAP, Scores, explains, promised, promising, score
-from ..fit import Refit, coarsened, extended
+from ..fit import Refit, coarsened, extended, with_exchanged_lags
 from ._contradicted import without_contradicted
 from ._decide import Accepted, decide
 from ._exchange import with_exchanged
@@ -16,7 +16,7 @@ from ._joint_check import checked_jointly
 from ._places import FIRST_ORDER
 from ._resolve_alternatives import resolve_alternatives
 from ._revise import needed, revised
-from ._short_list import ShortList, leaves_large_misfit, refit_short_list
+from ._short_list import Entry, ShortList, leaves_large_misfit, refit_short_list
 from ._state import SearchState
 
 MOST_EFFECTS = 3
@@ -88,12 +88,22 @@ def accept(state: SearchState) -> SearchState:
         return replace(state, complete=True)
     if state.rounds:  # the nominal fit is asked again
         state.fit.without_derivatives()
+    decision = replace(decision, best=_with_lags(decision.best))
     rounds, fit = (*state.rounds, decision), decision.best.fit
     if fit.structure.coarse:  # what a finer network changes depends on where the model is
         fit.without_derivatives()
         fit = coarsened(fit)
     left = leaves_large_misfit(state.fit, decision.best) or (len(rounds) == MOST_EFFECTS and fit.variance > _LARGE)
     return replace(state, current=state.scores, rounds=rounds, fit=fit, complete=left, misfit_left=left)
+
+
+def _with_lags(best: Entry) -> Entry:
+    """The accepted effect, with lags exchanged with the time constants of their lumps where that leaves far less."""
+    fit = with_exchanged_lags(best.fit)
+    if fit is best.fit:
+        return best
+    gain = extended(best.fit, fit.structure, fit.v).rss
+    return replace(best, fit=fit, delta_bic=best.delta_bic + fit.n_readings * math.log(best.fit.rss / gain))
 
 
 def reconsider(state: SearchState) -> SearchState:
