@@ -112,5 +112,5 @@ def _either(other: _Exchanged) -> str:
     lags = " and ".join(f"{parameter_in_words(name)} {other.lags[name]:.3g} s as well as {before:.3g} s"
                         for name, before in other.before.items())
     return (f"The data are explained as well with lag and time constant of the lump exchanged: {lags}. The temperature "
-            "of the lump itself is another one then, its reading the same. Measure the lag by itself, or give the "
-            "capacity of the lump with its standard deviation under [fit].")
+            "of the lump itself is another one then, its reading the same. Measure the lag by itself, or give what "
+            "else is known of the lump (capacity, gain of its heater, losses) with its standard deviation under [fit].")

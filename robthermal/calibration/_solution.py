@@ -29,7 +29,7 @@ class Solution:
     problem : JointProblem
         As weighed last.
     v : ndarray
-        Unknowns.
+        Coordinates of the parameters, then of the starts of the records.
     noise : dict
         Noise of every sensor [K or V].
     converged : bool
@@ -137,9 +137,9 @@ def cost_of(problem: JointProblem, v: Floats, loss: Loss) -> float:
     Parameters
     ----------
     problem : JointProblem
-        As weighed.
+        Records and responses with the weights to use.
     v : ndarray
-        Unknowns.
+        Coordinates of the parameters, then of the starts of the records.
     loss : {"linear", "soft_l1", "huber"}
         Of the weighted residuals.
     """

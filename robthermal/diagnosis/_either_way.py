@@ -47,7 +47,7 @@ def either_way_in_words(fit: Refit, others: dict[str, float]) -> list[str]:
     """
     return [f"The records are explained as well with {parameter_in_words(name)} {other:.3g} s as {now:.3g} s: it and "
             f"the time constant of {lump} may change places. The temperature of {lump} itself is another one then, its "
-            f"reading the same. Measure the lag by itself, or give the capacity of {lump} with its standard deviation "
-            "under [fit]."
+            f"reading the same. Measure the lag by itself, or give what else is known of {lump} (capacity, gain of its "
+            "heater, losses) with its standard deviation under [fit]."
             for name, other in others.items()
             for now, lump in [(fit.system.parameter(name), lags_of(fit)[name])]]

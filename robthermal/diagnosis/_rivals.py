@@ -93,7 +93,7 @@ def at_neighboring_lumps(state: SearchState) -> SearchState:
         With the effects that may be named.
     """
     named = {one.best.candidate.key for one in state.rounds}
-    return replace(state, rounds=tuple(with_other_end(with_neighbors(one), named, state.names)
+    return replace(state, rounds=tuple(with_other_end(with_neighbors(one, state.names), named, state.names)
                                        for one in state.rounds))
 
 

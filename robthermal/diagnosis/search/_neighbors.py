@@ -13,11 +13,14 @@ from ..fit import Refit, exact
 from ._decide import Accepted
 from ._short_list import Entry, Key, refit_short_list
 
+PATHS = ("missing_link", "missing_ambient_link")  # to a lump, and to what that lump is cooled by
 ALIKE = 0.9  # of the decrease of the sum of squares: a rival that reaches it is as good where the model is not exact
 
 
-def with_neighbors(round_: Accepted) -> Accepted:
+def with_neighbors(round_: Accepted, names: Sequence[str] | None = None) -> Accepted:
     """List beside a heat path those to neighboring lumps, refitted, that do nearly all that it does.
+
+    Of a path to a lump that an ambient cools the other place is that ambient, and the reverse.
 
     A path from the middle of a lump looks in a coarse network as if it came from between that lump and the next; the
     sum of squares decides for one of them beyond every statistical doubt, and can be wrong. A face of a module and the
@@ -27,13 +30,19 @@ def with_neighbors(round_: Accepted) -> Accepted:
     ----------
     round_ : Accepted
         Effect accepted beside a network that may be too coarse.
+    names : sequence of str, optional
+        Effects that may be named; default the whole catalog.
     """
     best, before = round_.best, round_.before
     if len(best.candidate.where) != 2:  # no path: a drift of an ambient is not in the catalog, either
         return round_
     known = {entry.candidate.key for entry in round_.contenders}
-    near = [one for one in before.testable(candidates(before.structure.base, [best.candidate.effect.name]))
-            if one.key not in known and neighboring(before.structure.base, one, best.candidate)]
+    asked = {best.candidate.effect.name}
+    if asked <= set(PATHS) and (names is None or set(PATHS) <= set(names)):
+        asked |= set(PATHS)
+    near = [one for one in before.testable(candidates(before.structure.base, sorted(asked)))
+            if one.key not in known and (neighboring(before.structure.base, one, best.candidate)
+                                         or beside_an_ambient(before.structure.base, one, best.candidate))]
     if not near:
         return round_
     own = next((one for one in candidates(before.structure.base, [best.candidate.effect.name])
@@ -66,6 +75,24 @@ def neighboring(system: System, one: Candidate, other: Candidate) -> bool:
     (a, b), (c, d) = one.where, other.where
     return any(all(p == q or frozenset((p, q)) in joined for p, q in ends)
                for ends in (((a, c), (b, d)), ((a, d), (b, c))))
+
+
+def beside_an_ambient(system: System, one: Candidate, other: Candidate) -> bool:
+    """Whether one of two heat paths goes to an ambient, the other from the same lump to one that this ambient cools.
+
+    Parameters
+    ----------
+    system : System
+        Network with the links to its ambients.
+    one, other : Candidate
+        Two candidates, of whatever effects.
+    """
+    ends = {candidate.effect.name: set(candidate.where) for candidate in (one, other)}
+    if set(ends) != set(PATHS):
+        return False
+    lumps, outside = (ends[name] for name in PATHS)
+    cooled = lumps ^ outside
+    return len(cooled) == 2 and any(set(link.between) == cooled for link in system.links)
 
 
 def one_place(round_: Accepted, system: System) -> bool:
