@@ -15,6 +15,7 @@ from .search import (
     Accepted,
     Entry,
     SearchState,
+    heats_instead,
     other_thermometers,
     refit_short_list,
     resolve_places,
@@ -56,11 +57,13 @@ def with_rivals(state: SearchState, finer: Refit, validation: Validation) -> Sea
 
 
 def _with_other_thermometers(state: SearchState, finer: Refit, validation: Validation) -> SearchState:
-    """List beside an offset of a thermometer those of others that do nearly as much, and predict."""
+    """List beside an offset of a thermometer others, and heats at its lump, that do nearly as much and predict."""
     def others(place: int, round_: Accepted) -> list[Entry]:
         less = without(state.fit, place, finer, round_.before)
-        return [] if less is None else [entry for entry in other_thermometers(round_, state.fit, less)
-                                        if predicts(entry.fit, finer, validation)]
+        if less is None:
+            return []
+        instead = (*other_thermometers(round_, state.fit, less), *heats_instead(round_, state.fit, less, state.names))
+        return [entry for entry in instead if predicts(entry.fit, finer, validation)]
 
     return replace(state, rounds=tuple(replace(round_, contenders=(*round_.contenders, *others(place, round_)))
                                        for place, round_ in enumerate(state.rounds)))
