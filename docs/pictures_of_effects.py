@@ -56,6 +56,7 @@ PICTURES = {
     "input_delay": Picture(("heater",), {"delay": 60.0}, "sample"),
     "input_lag": Picture(("heater",), {"time_constant": 60.0}, "sample"),
     "heater_power_slope": Picture(("heater",), {"slope": 0.02}, "sample"),
+    "driven_heat": Picture(("speed", "plate"), {"gain": 0.002}),
     "input_feedthrough": Picture(("heater", "sink"), {"share": 0.3}, "sample"),
     "sensor_lag": Picture(("T_plate",), {"time_constant": 60.0}),
     "sensor_offset": Picture(("T_plate",), {"offset": 1.0}),
@@ -71,19 +72,20 @@ def plant() -> rt.System:
         lumps={"sample": {"capacity": 30.0, "initial": ROOM}, "plate": {"capacity": 60.0, "initial": ROOM},
                "sink": {"capacity": 200.0, "initial": ROOM}},
         links=[{"between": ("sample", "plate"), "conductance": 0.5}, {"between": ("sink", "room"), "conductance": 2.0}],
-        inputs={"heater": {"lump": "sample"}},
+        inputs={"heater": {"lump": "sample"}, "speed": {"lump": "sample", "gain": 0.0, "unit": "rpm"}},
         modules={"m1": {"hot": "sink", "cold": "plate", "reference_temperature": ROOM, "seebeck": 0.05,
                         "resistance": 2.0, "conductance": 0.5}},
         sensors={f"T_{name}": {"lump": name} for name in ("sample", "plate", "sink")})
 
 
 def excitation() -> rt.Record:
-    """Heater alone, current of both signs, both together, then a warmer room."""
+    """Heater alone, current of both signs, both together, then a warmer room; a rotor that turns now and then."""
     heater = np.repeat([0.0, 4.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0], 30)
     current = np.repeat([0.0, 0.0, 1.5, -0.8, 0.0, 1.5, 1.0, 0.0], 30)
     room = np.repeat([ROOM, ROOM, ROOM, ROOM, ROOM, ROOM, ROOM, ROOM + 4.0], 30)
-    return rt.Record(sample_time=SAMPLE_TIME, inputs=np.column_stack([heater, current, room]),
-                     outputs=np.zeros((240, 0)), input_names=["heater", "m1", "room"], output_names=[])
+    speed = np.repeat([0.0, 1000.0, 0.0, 500.0, 1000.0, 0.0, 0.0, 1000.0], 30)
+    return rt.Record(sample_time=SAMPLE_TIME, inputs=np.column_stack([heater, current, room, speed]),
+                     outputs=np.zeros((240, 0)), input_names=["heater", "m1", "room", "speed"], output_names=[])
 
 
 def readings(name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -97,7 +99,8 @@ def readings(name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def title(name: str) -> str:
     """Place and size in words."""
     drive = "A" if "m1" in PICTURES[name].where else "W"
-    known = {"-": "", "unit": drive, "1/unit": f"1/{drive}", "1/unit²": f"1/{drive}²", "W/K^(1+exponent)": "W/K^1.25"}
+    known = {"-": "", "unit": drive, "W/unit": "W/rpm",
+             "1/unit": f"1/{drive}", "1/unit²": f"1/{drive}²", "W/K^(1+exponent)": "W/K^1.25"}
     sizes = []
     for key, value in PICTURES[name].values.items():
         unit = rt.thermal.effects()[name].parameters[key]

@@ -1,7 +1,7 @@
 """A motor on a test bench, by Euler steps of half a second: six nodes against the four lumps of its user.
 
 Copper gains resistance as it warms, and the air gap carries more heat the faster the rotor turns. The magnet may be
-heated in proportion to its speed, which no effect of the catalog says. Nothing is shared with robthermal.
+heated in proportion to its speed, for which effects may be named or not. Nothing is shared with robthermal.
 """
 
 from __future__ import annotations
@@ -87,8 +87,8 @@ def day(seed: int, n: int, eddy: float) -> rt.Record:
 
 
 @cache
-def found(eddy: float) -> rt.Diagnosis:
-    return rt.diagnose(MOTOR, day(1, 1500, eddy), validation=day(2, 1000, eddy), effects=EFFECTS)
+def found(eddy: float, *more: str) -> rt.Diagnosis:
+    return rt.diagnose(MOTOR, day(1, 1500, eddy), validation=day(2, 1000, eddy), effects=[*EFFECTS, *more])
 
 
 def sets(answer: rt.Diagnosis) -> list[set[str]]:
@@ -102,6 +102,15 @@ def test_copper_and_the_air_gap_are_named_with_their_sizes_and_nothing_else() ->
     assert values == {"heater_power_slope(copper)": pytest.approx(COPPER, rel=0.15),
                       "driven_conductance(magnet-tooth, speed)": pytest.approx(GAP, rel=0.15)}
     assert found(0.0).gap["validation"].after < 0.4 * found(0.0).gap["validation"].before
+
+
+def test_eddy_currents_of_the_magnet_are_named_too() -> None:
+    answer = found(2e-3, "driven_heat")
+    values = {one.label: next(iter(one.values.values()))[0] for one in answer.effects}
+    assert answer.verdict == "named_with_remainder" and answer.alternatives == ((), (), ())
+    assert values == {"heater_power_slope(copper)": pytest.approx(COPPER, rel=0.2),
+                      "driven_conductance(magnet-tooth, speed)": pytest.approx(GAP, rel=0.2),
+                      "driven_heat(speed, magnet)": pytest.approx(2e-3, rel=0.2)}
 
 
 def test_both_are_named_beside_a_heat_that_no_effect_says() -> None:

@@ -19,7 +19,7 @@ def bench() -> rt.System:
             ("plate", 20.0, 0.5), ("cold", 6.0, -1.0), ("hot", 9.0, 2.0))},
         links=[{"between": ("plate", "cold"), "conductance": 1.5}, {"between": ("hot", "room"), "conductance": 0.9},
                {"between": ("plate", "room"), "conductance": 0.06}],
-        inputs={"q": {"lump": "plate", "gain": 0.7}},
+        inputs={"q": {"lump": "plate", "gain": 0.7}, "v": {"lump": "plate", "gain": 0.0}},
         modules={"m": {"hot": "hot", "cold": "cold", "seebeck": {"value": 0.05, "slope": 1e-4},
                        "resistance": {"value": 2.0, "slope": 0.01}, "conductance": {"value": 0.3, "slope": 5e-4},
                        "reference_temperature": 300.0}},
@@ -28,8 +28,9 @@ def bench() -> rt.System:
 
 def record(start=0.0) -> rt.Record:
     rng = np.random.default_rng(5)
-    u = np.column_stack([rng.uniform(0, 3, N), rng.uniform(-1.0, 1.5, N), T0 + np.cumsum(rng.normal(0, 0.3, N))])
-    return rt.Record(sample_time=H, inputs=u, outputs=np.zeros((N, 0)), input_names=["q", "m", "room"],
+    u = np.column_stack([rng.uniform(0, 3, N), rng.uniform(-1.0, 1.5, N), T0 + np.cumsum(rng.normal(0, 0.3, N)),
+                         rng.uniform(0, 6, N)])
+    return rt.Record(sample_time=H, inputs=u, outputs=np.zeros((N, 0)), input_names=["q", "m", "room", "v"],
                      output_names=[], start_time=start)
 
 
@@ -55,7 +56,7 @@ CASES = [
     ("ambient_gradient", ["plate"], {"difference": 2.5}),
     ("periodic_load", ["cold"], {"heat": 0.9, "period": 37.0, "phase": 0.7}),
     ("conductance_step", ["plate-cold"], {"relative": -0.4, "time": 130.0}),
-    ("driven_conductance", ["plate-cold", "m"], {"relative": 0.4}),
+    ("driven_conductance", ["plate-cold", "m"], {"relative": 0.4}), ("driven_heat", ["v", "cold"], {"gain": 0.2}),
     ("condensation", ["cold"], {"conductance": 0.5, "dew_point": 296.2}),
 ]
 IDS = [f"{effect} {where[0]}" for effect, where, _ in CASES]
@@ -105,7 +106,7 @@ def heat_added(effect: str, p: dict, y: Sequence[float], acting: Sequence[float]
 
 def truth(effect: str, where: list, p: dict, run: rt.Record) -> np.ndarray:
     """Temperatures (n, 3), straight from the table of effects: nothing of the package but the record's numbers."""
-    q, m, room = (run[name] for name in ("q", "m", "room"))
+    q, m, room, v = (run[name] for name in ("q", "m", "room", "v"))
     is_ = lambda name, part=None: effect == name and (part is None or where[0] == part)  # noqa: E731
 
     def held(name, column, t):
@@ -139,6 +140,7 @@ def truth(effect: str, where: list, p: dict, run: rt.Record) -> np.ndarray:
                 + moved,
                 "hot": 0.9 * (ambient - hot) + S * hot * current + 0.5 * R * current**2 - K * (hot - cold) - taken
                 - moved + through}
+        into["cold"] += p["gain"] * held("v", v, mid) if is_("driven_heat") else 0.0
         heats, d_extra = heat_added(effect, p, y[:4], (current, ambient, t + run.start_time))
         into = {lump: flow + heats.get(lump, 0.0) for lump, flow in into.items()}
         return [into["plate"] / 20, into["cold"] / 6, into["hot"] / 9, d_extra, d_lag]
@@ -243,10 +245,10 @@ def everything() -> rt.System:
 
 def test_equations_and_their_jacobians_agree_with_all_effects_at_once():
     eq = rt.thermal.Equations(everything())
-    x, u = np.array([297.0, 295.0, 301.0]), np.array([1.3, 0.6, 295.0])
+    x, u = np.array([297.0, 295.0, 301.0]), np.array([1.3, 4.0, 0.6, 295.0])  # q, v, m, room
     for jacobian, f, z in ((eq.jacobian(x, u), lambda z: eq.heat(z, u), x),
                            (eq.input_jacobian(x, u), lambda z: eq.heat(x, z), u)):
-        columns = [f(z.astype(complex) + 1e-40j * e).imag / 1e-40 for e in np.eye(3)]
+        columns = [f(z.astype(complex) + 1e-40j * e).imag / 1e-40 for e in np.eye(z.size)]
         assert jacobian.toarray() == pytest.approx(np.array(columns).T, rel=1e-12, abs=1e-12)
     for name in eq.system.parameter_names:
         if name.endswith((".initial", ".disturbance", ".delay", ".time_constant", ".noise", ".capacity")):
@@ -269,7 +271,7 @@ def test_equations_and_their_jacobians_agree_with_all_effects_at_once():
 
 @pytest.mark.exhaustive
 def test_all_effects_together_have_exact_sensitivities():
-    system, run = everything(), record().select(inputs=["q", "m"], outputs=[])
+    system, run = everything(), record().select(inputs=["q", "m", "v"], outputs=[])
     names = ["ambients.room.temperature", "inputs.q.gain", "inputs.q.feedthrough.share", "lumps.plate.gradient",
              "links.plate-room.conductance", "modules.m.drive.cubic", "leads.m-plate.resistance"]
     exact = rt.thermal.trajectory(system, run, sensitivities=names, tolerance=FINE).sensitivity
@@ -314,10 +316,10 @@ def test_linearization_follows_a_lagged_input():
 
 def test_steady_state_is_where_the_simulation_ends():
     system = everything()
-    long = rt.Record(sample_time=200.0, inputs=np.tile([1.0, 0.5, T0], (40, 1)), outputs=np.zeros((40, 0)),
-                     input_names=["q", "m", "room"], output_names=[])
+    long = rt.Record(sample_time=200.0, inputs=np.tile([1.0, 0.5, T0, 3.0], (40, 1)), outputs=np.zeros((40, 0)),
+                     input_names=["q", "m", "room", "v"], output_names=[])
     end = rt.thermal.trajectory(system, long).lumps[-1]
-    found = rt.thermal.steady_state(system, {"q": 1.0, "m": 0.5}).equilibria[0].temperatures
+    found = rt.thermal.steady_state(system, {"q": 1.0, "m": 0.5, "v": 3.0}).equilibria[0].temperatures
     assert end == pytest.approx(list(found.values()), abs=1e-3)
 
 
@@ -329,8 +331,9 @@ def test_stepping_equals_simulating():
     start = {"plate": 297.0, "cold": 296.0, "hot": 298.0}
     run = rt.thermal.trajectory(system, record(), initial=start)
     plant = rt.thermal.Stepper(system, H, initial=start)
-    columns = [record()[name] for name in ("q", "m", "room")]
-    steps = [plant.step(dict(zip(("q", "m", "room"), values, strict=True))) for values in zip(*columns, strict=True)]
+    names = ("q", "m", "room", "v")
+    columns = [record()[name] for name in names]
+    steps = [plant.step(dict(zip(names, values, strict=True))) for values in zip(*columns, strict=True)]
     assert np.array(steps[:-1]) == pytest.approx(run.lumps[1:], abs=1e-3)
     delayed = rt.thermal.add_effect(bench(), "input_delay", ["q"], {"delay": 3.0}).system
     with pytest.raises(rt.InputError, match=r"inputs\.q\.drive\.delay when stepping"):

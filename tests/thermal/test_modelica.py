@@ -71,6 +71,12 @@ def test_simulation_of_the_text_is_ours(effects, full, drive):
     compare(system, drive(n=8, seed=3), 2e-4)
 
 
+def test_heat_in_proportion_to_a_column_is_in_the_text(full, drive):
+    turning = rt.System(**{**dict(full), "inputs": {**full.inputs, "turns": {"lump": "sample", "gain": 0.0}}})
+    system = rt.thermal.add_effect(turning, "driven_heat", ["turns", "cold"], {"gain": 0.2}).system
+    compare(system.with_parameters({"sensors.T_sample.delay": 2.0}), drive(n=8, seed=3, system=system), 2e-4)
+
+
 def test_voltages_are_outputs_of_the_text(full, drive):
     volt = {"volt": {"module": "tem", "gain": 1.02, "offset": 0.01, "lead_resistance": 0.1}}
     system = rt.System(**{**dict(full), "sensors": {**full.sensors, **volt}})
@@ -82,7 +88,7 @@ def test_voltages_are_outputs_of_the_text(full, drive):
 
 def test_every_effect_of_the_catalog_is_tested():
     assert set(EFFECTS) == {effect for group in GROUPS for effect in group}
-    assert set(EFFECTS) | {"missing_ambient_link"} == set(rt.thermal.effects())
+    assert set(EFFECTS) | {"missing_ambient_link", "driven_heat"} == set(rt.thermal.effects())
 
 
 def test_all_effects_at_once(full, drive):

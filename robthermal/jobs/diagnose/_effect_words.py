@@ -13,6 +13,7 @@ WORDS = {  # {0}, {1}: the parts it acts on, in the order of the catalog
     "conductance_slope": "the slope of the conductance of {0} over temperature",
     "conductance_step": "a change of the conductance {0} during the record",
     "driven_conductance": "a growth of the conductance {0} with {1}",
+    "driven_heat": "a heat into {1} in proportion to {0}",
     "heat_source": "a constant heat into {0}",
     "heater_power_slope": "a dependence of the power of {0} on its temperature",
     "hidden_mass": "a mass that hangs on {0}",
