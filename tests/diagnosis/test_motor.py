@@ -122,3 +122,12 @@ def test_an_offset_does_not_stand_alone_for_a_heat_of_the_magnet() -> None:
     (offset,) = [names for names in sets(found(2e-3)) if "sensor_offset(T_magnet)" in names]
     assert found(2e-3).verdict == "ambiguous"
     assert {"heat_source(magnet)", "input_feedthrough(iron, magnet)"} <= offset
+
+
+def test_a_column_heats_one_lump_at_a_time() -> None:
+    (magnet, tooth), (share,) = ([one for one in rt.diagnosis.candidates(MOTOR, [name]) if one.where in places]
+                                 for name, places in (("driven_heat", [("speed", "magnet"), ("speed", "tooth")]),
+                                                      ("input_feedthrough", [("iron", "magnet")])))
+    structure = rt.diagnosis.refit(MOTOR, day(1, 300, 0.0)).structure
+    assert structure.with_effect(magnet).hides(tooth) and not structure.with_effect(magnet).hides(share)
+    assert not structure.hides(tooth)

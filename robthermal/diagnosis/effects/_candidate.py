@@ -63,6 +63,17 @@ class Candidate:
         """
         return self.effect.add(system, self.where, {**self.shape, self.effect.size.name: size})
 
+    def displaces(self, other: Candidate) -> bool:
+        """Whether both take heat of one input to a lump, each to its own: a system has one of them at a time.
+
+        Parameters
+        ----------
+        other : Candidate
+            What has been added to a system.
+        """
+        return (self.effect.where == ("input", "lump") and self.effect.name == other.effect.name
+                and self.where[0] == other.where[0] and self.where != other.where)
+
     def trials(self, context: TrialContext) -> list[Candidate]:
         """The same with every combination of trial values, for one record.
 

@@ -25,7 +25,6 @@ from ._sessions import Sessions
 
 Array = NDArray[np.float64]
 _FARTHEST = 20.0  # standard deviations of an initial temperature
-_INTO = ("input", "lump")  # place of an effect that takes heat of an input to a lump: to one at a time
 _STILL = 1e-6  # standard deviations from a bound
 _COARSEST = 2.5  # times what is usual: a place off by more than half a lump belongs to another lump
 
@@ -364,9 +363,7 @@ class Structure:
         """
         if any(part in self._added for part in candidate.where):
             return "it would act on a part that another effect has added"
-        if candidate.effect.where == _INTO and any(
-                one.effect.name == candidate.effect.name and one.where[0] == candidate.where[0]
-                and one.where != candidate.where for one in self.effects):
+        if any(map(candidate.displaces, self.effects)):
             return "its column heats another lump already"
         reasons = [one.hides(self.base, candidate) for one in self.data]
         return reasons[0] if all(reasons) else self.sessions.hides(candidate)

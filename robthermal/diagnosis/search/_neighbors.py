@@ -34,15 +34,7 @@ def with_neighbors(round_: Accepted, names: Sequence[str] | None = None) -> Acce
         Effects that may be named; default the whole catalog.
     """
     best, before = round_.best, round_.before
-    if len(best.candidate.where) != 2:  # no path: a drift of an ambient is not in the catalog, either
-        return round_
-    known = {entry.candidate.key for entry in round_.contenders}
-    asked = {best.candidate.effect.name}
-    if asked <= set(PATHS) and (names is None or set(PATHS) <= set(names)):
-        asked |= set(PATHS)
-    near = [one for one in before.testable(candidates(before.structure.base, sorted(asked)))
-            if one.key not in known and (neighboring(before.structure.base, one, best.candidate)
-                                         or beside_an_ambient(before.structure.base, one, best.candidate))]
+    near = _near(round_, names)
     if not near:
         return round_
     own = next((one for one in candidates(before.structure.base, [best.candidate.effect.name])
@@ -55,6 +47,19 @@ def with_neighbors(round_: Accepted, names: Sequence[str] | None = None) -> Acce
     listed = {entry.candidate.key for entry in alike}  # ΔBIC and densities say less of places than they do of effects
     return replace(round_, contenders=(*round_.contenders, *alike),
                    ruled_out=tuple(entry for entry in round_.ruled_out if entry.candidate.key not in listed))
+
+
+def _near(round_: Accepted, names: Sequence[str] | None) -> list[Candidate]:
+    """Other places of the path, without those that are listed."""
+    best, before = round_.best.candidate, round_.before
+    if len(best.where) != 2:  # no path: a drift of an ambient is not in the catalog, either
+        return []
+    known, system = {entry.candidate.key for entry in round_.contenders}, before.structure.base
+    asked = {best.effect.name}
+    if asked <= set(PATHS) and (names is None or set(PATHS) <= set(names)):
+        asked |= set(PATHS)
+    return [one for one in before.testable(candidates(system, sorted(asked))) if one.key not in known
+            and (neighboring(system, one, best) or beside_an_ambient(system, one, best))]
 
 
 def neighboring(system: System, one: Candidate, other: Candidate) -> bool:
