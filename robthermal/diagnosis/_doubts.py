@@ -32,8 +32,8 @@ def doubts(system: System, remainder: bool) -> list[str]:
     """
     if not system.modules or not remainder:
         return []
-    return ["A module has no inside of its own in this test. Of 69 simulated stacks with a module that got a name, "
-            "three got a wrong one, which does not exclude one in eight: confirm this name on the machine."]
+    return ["A module has no inside of its own in this test. Of 95 simulated stacks with a module that got a name, "
+            "five got a wrong one, which does not exclude one in eight: confirm this name on the machine."]
 
 
 def nothing_fitted(nominal: Refit, verdict: Verdict) -> list[str]:

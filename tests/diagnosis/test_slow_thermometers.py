@@ -9,6 +9,7 @@ from slow_thermometers import LAG, PATH, board, run, staircase
 import robthermal as rt
 from robthermal.diagnosis import _searching
 from robthermal.diagnosis.fit import refit
+from robthermal.jobs.diagnose import Diagnosed, diagnosis_report
 
 ROOM = 295.0
 Days = tuple[rt.Record, rt.Record]
@@ -74,6 +75,9 @@ def test_a_lag_that_may_change_places_with_its_lump_is_said_with_both_values() -
     assert one.values["time_constant"][0] == pytest.approx(30.0, rel=0.05)
     assert one.to_dict()["either"] == {"time_constant": pytest.approx(200.0, rel=0.05)}
     assert "(or 200 s)" in str(found) and "change places" in found.outcome.text
+    (table, _) = next(part for part in diagnosis_report(Diagnosed(found, (), (), ())).sections
+                      if part.anchor == "effects").tables
+    assert list(table.frame["or as well"]) == [one.either["time_constant"]]
 
 
 def test_a_capacity_that_is_known_tells_the_lag_from_its_lump() -> None:

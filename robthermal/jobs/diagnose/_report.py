@@ -169,6 +169,7 @@ def _candidate_tables(ranked: pd.DataFrame) -> tuple[Table, ...]:
 def _effect_section(found: Diagnosis) -> Section:
     listed = found.effects or found.provisional
     rows = [{"effect": effect.label, "quantity": name, "value": value, "standard deviation": std,
+             **({"or as well": effect.either[name]} if name in effect.either else {}),
              **({"in augmented.toml": effect.augmented[name]} if name in effect.augmented else {}), "unit": unit,
              "ΔBIC": effect.delta_bic, "p": chance(effect.p_value), **_evidence(effect)}
             for effect in listed for name, (value, std, unit) in effect.values.items()]

@@ -88,6 +88,7 @@ _WORDS = {  # page of docs/explanations: word to meaning
         "share of the gap": "Part of what the model leaves that an effect explains.",
         "better in blocks": "In which share of the blocks of the records the effect helps by itself.",
         "spread over segments": "How much its size differs between the segments of the records.",
+        "or as well": "Another value that explains the records as well: a lag that may change places with its lump.",
         "in augmented.toml": "Its size in the system that is written: fitted without what a finer network changes.",
         "limit": "Size of an effect that would have been seen with a probability of 0.9.",
         "noise alone": "What the noise of the sensors would leave.",
