@@ -15,6 +15,7 @@ from ._joint import JointProblem
 from ._solution import Solution, cost_of
 
 _FAR_LESS = 0.5  # of the cost: what is left with the times exchanged, where these are taken
+_NEAR = 10.0  # times the cost: what exchanged times leave before they are fitted, where an optimum is near
 _AS_GOOD = 10.0  # of the cost, in what a reading adds to it: the data do not tell one from the other
 
 Solved = Callable[[JointProblem, Floats], Solution]
@@ -57,7 +58,7 @@ def with_exchanged_lags(solution: Solution, loss: Loss, solved: Solved) -> tuple
     said: list[str] = []
     for _ in range(1 + len(_lags(solution))):  # each may have to be exchanged beside the others
         said, cost = [], cost_of(solution.problem, solution.v, loss)
-        for other in _others(solution, solved):
+        for other in _others(solution, cost, loss, solved):
             left = cost_of(solution.problem, other.solution.v, loss)
             if left < _FAR_LESS * cost:
                 solution = other.solution
@@ -75,18 +76,23 @@ def _lags(solution: Solution) -> dict[str, str]:
     return {name: lump for name, lump in lagged_parts(solution.problem.system).items() if name in flat}
 
 
-def _others(solution: Solution, solved: Solved) -> Iterator[_Exchanged]:
+def _others(solution: Solution, cost: float, loss: Loss, solved: Solved) -> Iterator[_Exchanged]:
     """Solutions from one lag exchanged with its lump, then from those of all thermometers together."""
+    def near(joint: JointProblem, v: Floats) -> Solution | None:
+        return solved(joint, v) if cost_of(joint, v, loss) < _NEAR * cost else None
+
     lags = _lags(solution)
     thermometers = {name: lump for name, lump in lags.items() if name.startswith("sensors.")}
     for some in [*({name: lump} for name, lump in lags.items()), *([thermometers] if len(thermometers) > 1 else [])]:
-        found = _exchanged(solution, some, solved)
+        found = _exchanged(solution, some, near)
         if found is not None:
             yield found
 
 
-def _exchanged(solution: Solution, lags: dict[str, str], solved: Solved) -> _Exchanged | None:
-    """The solution from some lags exchanged with their lumps; None where that is no start."""
+def _exchanged(solution: Solution, lags: dict[str, str], solved: Callable[[JointProblem, Floats], Solution | None]
+               ) -> _Exchanged | None:
+    """The solution from some lags exchanged with their lumps; None where that is no start, or far from every optimum.
+    """
     joint, ranges = solution.problem, solution.problem.ranges
     p, at = len(ranges.names), {name: i for i, group in enumerate(ranges.members) for name in group}
     values = ranges.values(solution.v[:p])
@@ -102,6 +108,8 @@ def _exchanged(solution: Solution, lags: dict[str, str], solved: Solved) -> _Exc
     try:
         new = solved(joint, np.concatenate([ranges.coordinates(start), solution.v[p:]]))
     except (Diverged, InputError):  # the model runs away from there: no optimum
+        return None
+    if new is None:
         return None
     ended = ranges.values(new.v[:p])
     return _Exchanged(new, before, asked, {name: float(ended[at[name]]) for name in lags})

@@ -13,11 +13,13 @@ from ...errors import Diverged, InputError
 from ...fitting import exchanged_lags, lagged_parts
 from ._refit import Refit
 from ._refitting import exact, extended, fitted
+from ._whitened import Whitened
 
 TIME = "time_constant"
 _FAR_LESS = 0.5  # of the sum of squares: what is left with the times exchanged, where these are taken
 _FEW = 5  # evaluations with other filters, from the optimum with its own
 _LARGE = 1.5  # whitened variance
+_NEAR = 20.0  # times the sum of squares: what exchanged times leave before they are fitted, where an optimum is near
 _EVALUATIONS = 20  # from times exchanged
 _NAMES = {"sensor_lag": "sensors.{}.time_constant", "input_lag": "inputs.{}.drive.time_constant"}
 
@@ -60,7 +62,7 @@ def exchanged(fit: Refit, lags: Mapping[str, str]) -> Refit | None:
     Returns
     -------
     Refit or None
-        None where nothing of a lump is estimated, or its model runs away from there.
+        None where nothing of a lump is estimated, its model runs away from there, or no optimum is near.
     """
     structure, ranges = fit.structure, fit.structure.ranges
     values = ranges.values(fit.v[:structure.n_parameters])
@@ -79,7 +81,10 @@ def exchanged(fit: Refit, lags: Mapping[str, str]) -> Refit | None:
     v = structure.start(start, quantities)
     first = structure.n_common - structure.n_coarse
     v[first:] = fit.v[first:]
+    v = np.clip(v, *structure.bounds)
     try:
+        if float(np.sum(Whitened(structure, fit.whiteners).residual(v) ** 2)) > _NEAR * fit.rss:
+            return None
         return extended(fit, structure, v, _EVALUATIONS)
     except (Diverged, InputError):
         return None
