@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -61,7 +61,7 @@ def with_exchanged_lags(solution: Solution, loss: Loss, solved: Solved) -> tuple
         for other in _others(solution, cost, loss, solved):
             left = cost_of(solution.problem, other.solution.v, loss)
             if left < _FAR_LESS * cost:
-                solution = other.solution
+                solution, said = other.solution, []
                 break
             if other.elsewhere and left - cost < _AS_GOOD * max(cost / solution.problem.n_numbers, 1.0):
                 said.append(_either(other))
@@ -106,7 +106,8 @@ def _exchanged(solution: Solution, lags: dict[str, str], solved: Callable[[Joint
         start[at[name]] = np.clip(own[lump], ranges.lower[at[name]], ranges.upper[at[name]])
     asked = {name: float(start[at[name]]) for name in lags}
     try:
-        new = solved(joint, np.concatenate([ranges.coordinates(start), solution.v[p:]]))
+        new = solved(replace(joint, records=replace(joint.records)),  # a fit sets the weights of its records
+                     np.concatenate([ranges.coordinates(start), solution.v[p:]]))
     except (Diverged, InputError):  # the model runs away from there: no optimum
         return None
     if new is None:

@@ -75,3 +75,13 @@ def test_nothing_is_asked_of_a_lag_that_is_known() -> None:
     system = bar(100.0, 30.0)
     fit = rt.calibrate(system, measured(system), parameters={"lumps.bar.capacity": (10.0, 500.0)})
     assert open_lags(fit) == []
+
+
+def test_what_was_tried_does_not_change_the_weights() -> None:
+    """With the noise estimated, a fit that leaves much has weights of its own."""
+    start = board(path=True, lag=20.0)
+    system = start.model_copy(update={"sensors": {name: one.model_copy(update={"noise": 0.0})
+                                                  for name, one in start.sensors.items()}})
+    declared, estimated = (rt.calibrate(one, run(staircase(900, 5), 2)) for one in (start, system))
+    assert estimated.noise == {name: pytest.approx(0.1, rel=0.1) for name in ("T1", "T2")}
+    assert estimated.std == {name: pytest.approx(std, rel=0.2) for name, std in declared.std.items()}
