@@ -158,7 +158,7 @@ def calibrate(system: System, data: Measured | Sequence[Measured], *, parameters
     if filtered:
         refuse_unknown_noise(levels)
     solution = from_rest(problem, lambda one: solve(one, levels, loss, max_iterations, filtered))
-    solution, either = with_exchanged_lags(
+    solution, others, either = with_exchanged_lags(
         solution, loss, lambda one, v: solve(one, levels, loss, max_iterations, filtered, v))
     said = " ".join([*rows.said, *rows.doubted])
     if training and not responses:
@@ -170,7 +170,7 @@ def calibrate(system: System, data: Measured | Sequence[Measured], *, parameters
 
         left = _rms(solution)
         said = " ".join(filter(None, [said, misread(system, training, left, left, levels, fitted)]))
-    return _result(solution, held_out, compared, initial, loss, (said, either))
+    return replace(_result(solution, held_out, compared, initial, loss, (said, either)), other_optima=others)
 
 
 def _result(solution: Solution, held_out: list[Data], compared: list[MeasuredResponse], initial: Start, loss: Loss,

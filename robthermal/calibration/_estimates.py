@@ -51,6 +51,8 @@ class Estimates:
         Model evaluations the optimizer tried.
     outcome : Outcome
         Codes "converged", "at_bound", "undetermined" (not ok), "not_converged" (not ok).
+    other_optima : tuple of ndarray, shape (p,)
+        Other values of all parameters that explain the data as well; `ranges` hold these too.
     remarks : tuple of str
         What was taken for granted about the records, a sentence or three each: an ambient that they do not hold, when
         their means were taken.
@@ -73,6 +75,7 @@ class Estimates:
     iterations: int
     outcome: Outcome
     remarks: tuple[str, ...] = ()
+    other_optima: tuple[Floats, ...] = ()
 
     @property
     def std(self) -> dict[str, float]:
@@ -102,7 +105,8 @@ class Estimates:
         -------
         dict
             {parameter: (lower, upper)} in the unit of each; tied parameters one by one. What neither data nor prior
-            determine has the bounds of the calibration. Ranges end at those bounds.
+            determine has the bounds of the calibration. Ranges end at those bounds. Where the data are explained as
+            well elsewhere (`other_optima`) they reach from one optimum to the other.
 
         Raises
         ------
@@ -132,6 +136,10 @@ class Estimates:
         with np.errstate(over="ignore"):  # beyond every bound, at which it is cut
             low, high = (np.where(self.logarithmic, values * np.exp(np.where(self.logarithmic, side, 0.0)),
                                   values + side) for side in (-reach, reach))
+        centers = [values, *self.other_optima]  # as wide at each, in the same coordinates
+        low, high = (choose([np.where(self.logarithmic, end * other / np.where(self.logarithmic, values, 1.0),
+                                      end + other - values) for other in centers], axis=0)
+                     for choose, end in ((np.min, low), (np.max, high)))
         low, high = np.clip(low, self.lower, self.upper), np.clip(high, self.lower, self.upper)
         return np.where(self.bounded, self.lower, low), np.where(self.bounded, self.upper, high)
 

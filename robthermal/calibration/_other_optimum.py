@@ -9,7 +9,7 @@ import numpy as np
 
 from .._arrays import Floats
 from ..errors import Diverged, InputError
-from ..fitting import Loss, exchanged_lags, lagged_parts
+from ..fitting import Loss, choices_of, exchanged_lags, is_elsewhere, lagged_parts
 from ..thermal import parameter_in_words
 from ._joint import JointProblem
 from ._solution import Solution, cost_of
@@ -33,11 +33,10 @@ class _Exchanged:
     @property
     def elsewhere(self) -> bool:
         """Whether it is nearer to the exchanged times than to those before: else the optimizer came back."""
-        return all(abs(np.log(self.lags[name] / before)) > 0.5 * abs(np.log(self.asked[name] / before))
-                   for name, before in self.before.items())
+        return all(is_elsewhere(before, self.asked[name], self.lags[name]) for name, before in self.before.items())
 
 
-def with_exchanged_lags(solution: Solution, loss: Loss, solved: Solved) -> tuple[Solution, str]:
+def with_exchanged_lags(solution: Solution, loss: Loss, solved: Solved) -> tuple[Solution, tuple[Floats, ...], str]:
     """The better of a solution and those with lags and the time constants of their lumps exchanged; what stays open.
 
     Parameters
@@ -52,22 +51,25 @@ def with_exchanged_lags(solution: Solution, loss: Loss, solved: Solved) -> tuple
     Returns
     -------
     Solution
+    tuple of ndarray, shape (p,)
+        Values of all parameters where the data are explained as well.
     str
         A sentence for every lag that may as well be the other way round; empty where the data tell.
     """
-    said: list[str] = []
+    alike: list[_Exchanged] = []
     for _ in range(1 + len(_lags(solution))):  # each may have to be exchanged beside the others
-        said, cost = [], cost_of(solution.problem, solution.v, loss)
+        alike, cost = [], cost_of(solution.problem, solution.v, loss)
         for other in _others(solution, cost, loss, solved):
             left = cost_of(solution.problem, other.solution.v, loss)
             if left < _FAR_LESS * cost:
-                solution, said = other.solution, []
+                solution, alike = other.solution, []
                 break
             if other.elsewhere and left - cost < _AS_GOOD * max(cost / solution.problem.n_numbers, 1.0):
-                said.append(_either(other))
+                alike.append(other)
         else:
             break
-    return solution, " ".join(said)
+    p, ranges = len(solution.problem.ranges.names), solution.problem.ranges
+    return solution, tuple(ranges.values(one.solution.v[:p]) for one in alike), " ".join(map(_either, alike))
 
 
 def _lags(solution: Solution) -> dict[str, str]:
@@ -81,9 +83,7 @@ def _others(solution: Solution, cost: float, loss: Loss, solved: Solved) -> Iter
     def near(joint: JointProblem, v: Floats) -> Solution | None:
         return solved(joint, v) if cost_of(joint, v, loss) < _NEAR * cost else None
 
-    lags = _lags(solution)
-    thermometers = {name: lump for name, lump in lags.items() if name.startswith("sensors.")}
-    for some in [*({name: lump} for name, lump in lags.items()), *([thermometers] if len(thermometers) > 1 else [])]:
+    for some in choices_of(_lags(solution)):
         found = _exchanged(solution, some, near)
         if found is not None:
             yield found

@@ -20,6 +20,7 @@ _ROUNDS = 8  # of noise estimation
 _SETTLED = 0.01  # relative change of the noise levels
 _STILL = 1e-3  # change of the parameters between two filters, in `Ranges.unit`
 
+
 @dataclass(frozen=True)
 class Solution:
     """Where the optimizer ended.
@@ -127,8 +128,6 @@ def _levels(problem: Problem, v: Floats, unknown: list[str], loss: Loss) -> dict
                          remedy="Start closer to the truth: system.with_parameters({...}).") from None
     return {name: estimated_noise(problem.data, residuals, name, loss, smallest_noise(problem.system, name))
             for name in unknown}
-
-
 
 
 def cost_of(problem: JointProblem, v: Floats, loss: Loss) -> float:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
-from ..fitting import own_times
+from ..fitting import is_elsewhere, own_times
 from ..thermal import parameter_in_words
 from ._judge import Verdict
 from .fit import Refit, exchanged, lags_of
 
 _AS_GOOD = 10.0  # of the sum of squares, in what a reading adds to it: the records do not tell one from the other
-_NEARER = 0.5  # of the way, in logarithms, from the lag to the exchanged one: less is the same optimum again
 
 
 def either_way(fit: Refit, verdict: Verdict) -> dict[str, float]:
@@ -30,7 +27,7 @@ def either_way(fit: Refit, verdict: Verdict) -> dict[str, float]:
             continue
         lag, new = fit.system.parameter(name), other.system.parameter(name)
         own = own_times(fit.system)[lump]
-        if abs(math.log(new / lag)) > _NEARER * abs(math.log(own / lag)):
+        if is_elsewhere(lag, own, new):
             out[name] = new
     return out
 

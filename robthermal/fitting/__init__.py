@@ -7,7 +7,9 @@ from ._data import Data as Data
 from ._data import as_data as as_data
 from ._data import refuse_same as refuse_same
 from ._data import refuse_short as refuse_short
+from ._exchanged_lag import choices_of as choices_of
 from ._exchanged_lag import exchanged_lags as exchanged_lags
+from ._exchanged_lag import is_elsewhere as is_elsewhere
 from ._exchanged_lag import lagged_parts as lagged_parts
 from ._exchanged_lag import own_times as own_times
 from ._free_run import FreeRun as FreeRun

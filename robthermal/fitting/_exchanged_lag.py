@@ -33,6 +33,29 @@ def lagged_parts(system: System) -> dict[str, str]:
     return {name: lump for name, lump in (sensors | heaters).items() if lump is not None}
 
 
+def choices_of(lags: Mapping[str, str]) -> list[dict[str, str]]:
+    """What is exchanged at once: every lag by itself, then those of all thermometers together.
+
+    Parameters
+    ----------
+    lags : mapping of str to str
+        Lumps by the names of the lags, as in `lagged_parts`.
+    """
+    thermometers = {name: lump for name, lump in lags.items() if name.startswith("sensors.")}
+    return [*({name: lump} for name, lump in lags.items()), *([thermometers] if len(thermometers) > 1 else [])]
+
+
+def is_elsewhere(before: float, asked: float, ended: float) -> bool:
+    """Whether a lag has ended nearer to where it was put than to where it was: else it is the same optimum again.
+
+    Parameters
+    ----------
+    before, asked, ended : float
+        The lag at the first optimum, where it was put, and where the fit from there ended [s].
+    """
+    return abs(math.log(ended / before)) > 0.5 * abs(math.log(asked / before))
+
+
 def own_times(system: System) -> dict[str, float]:
     """Time constant of every lump between neighbors that hold still [s]; infinite for one that would run away.
 

@@ -38,10 +38,11 @@ def measured(system: rt.System) -> rt.Record:
     return exact.with_outputs(exact.outputs + noise)
 
 
-def calibrated(system: rt.System, sigma: float | None = None) -> rt.calibration.Fit:
+def calibrated(system: rt.System, sigma: float | None = None, *, record: rt.Record | None = None
+               ) -> rt.calibration.Fit:
     capacity = rt.thermal.FitRange(lower=5.0, upper=500.0, sigma=sigma)
     start = system.with_parameters({"lumps.bar.capacity": 110.0, "sensors.T.time_constant": 15.0})
-    return rt.calibrate(start, measured(system), parameters={
+    return rt.calibrate(start, measured(system) if record is None else record, parameters={
         "lumps.bar.capacity": capacity, "links.bar-room.conductance": rt.thermal.FitRange(lower=0.05, upper=5.0),
         "sensors.T.time_constant": rt.thermal.FitRange(lower=1.0, upper=500.0)})
 
@@ -85,3 +86,17 @@ def test_what_was_tried_does_not_change_the_weights() -> None:
     declared, estimated = (rt.calibrate(one, run(staircase(900, 5), 2)) for one in (start, system))
     assert estimated.noise == {name: pytest.approx(0.1, rel=0.1) for name in ("T1", "T2")}
     assert estimated.std == {name: pytest.approx(std, rel=0.2) for name, std in declared.std.items()}
+
+
+@pytest.mark.parametrize("confidence", [0.5, 0.95])
+def test_ranges_hold_the_truth_where_the_nearer_optimum_is_the_wrong_one(confidence: float) -> None:
+    truth = bar(15.0, 200.0)
+    fit = calibrated(truth, record=measured(truth))
+    assert fit.parameters["lumps.bar.capacity"] == pytest.approx(100.0, rel=0.02)  # the start is nearer to it
+    ranges = fit.ranges(confidence)
+    for name, value in (("lumps.bar.capacity", 15.0), ("sensors.T.time_constant", 200.0)):
+        assert ranges[name][0] < value < ranges[name][1]
+    low, high = ranges["links.bar-room.conductance"]
+    assert high - low < 0.01  # both optima agree
+    told = calibrated(bar(100.0, 30.0), 10.0)
+    assert told.other_optima == () and told.ranges(confidence)["lumps.bar.capacity"][0] > 98.0

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from types import ModuleType
+
 import numpy as np
 import pytest
 from slow_thermometers import LAG, PATH, board, run, staircase
 
 import robthermal as rt
 from robthermal.diagnosis import _searching
-from robthermal.diagnosis.fit import refit
+from robthermal.diagnosis.fit import _exchanged, refit
+from robthermal.diagnosis.search import _slow_thermometer, begin
+from robthermal.errors import Diverged
 from robthermal.jobs.diagnose import Diagnosed, diagnosis_report
 
 ROOM = 295.0
@@ -50,6 +54,22 @@ def test_a_path_is_named_beside_lags_of_the_fit_table(days: Days) -> None:
 def test_the_nominal_fit_finds_the_other_optimum(days: Days) -> None:
     fit = refit(board(path=True, lag=20.0), list(days))
     assert fit.rms < 0.11 and fit.system.sensors["T2"].time_constant == pytest.approx(LAG, rel=0.02)
+
+
+@pytest.mark.parametrize("where", [_exchanged, _slow_thermometer])
+def test_an_exchange_from_which_the_model_runs_away_is_none(days: Days, monkeypatch: pytest.MonkeyPatch,
+                                                             where: ModuleType) -> None:
+    """Wherever it happens: after the exchange of the nominal fit, or at the other beginning of the search."""
+    def away(*args: object) -> None:
+        raise Diverged("too warm", time=1.0)
+
+    system = board(path=where is _exchanged, lag=20.0)
+    plain = refit(system, days[0])
+    monkeypatch.setattr(where, "fitted", away)
+    if where is _exchanged:
+        assert plain.rms < 0.11 < 0.4 < refit(system, days[0]).rms
+    else:
+        assert _slow_thermometer.from_slow_thermometer(begin(plain)) is None
 
 
 def bar(**own: float) -> rt.System:

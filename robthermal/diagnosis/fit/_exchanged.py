@@ -10,12 +10,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...errors import Diverged, InputError
-from ...fitting import exchanged_lags, lagged_parts
+from ...fitting import choices_of, exchanged_lags, lagged_parts
 from ._refit import Refit
 from ._refitting import exact, extended, fitted
 from ._whitened import Whitened
 
-TIME = "time_constant"
+_TIME = "time_constant"
 _FAR_LESS = 0.5  # of the sum of squares: what is left with the times exchanged, where these are taken
 _FEW = 5  # evaluations with other filters, from the optimum with its own
 _LARGE = 1.5  # whitened variance
@@ -68,14 +68,14 @@ def exchanged(fit: Refit, lags: Mapping[str, str]) -> Refit | None:
     values = ranges.values(fit.v[:structure.n_parameters])
     quantities, places = structure.quantities(fit.v), _effects(fit)
     at = {name: i for i, group in enumerate(ranges.members) for name in group}
-    before = {name: quantities[places[name]][TIME] if name in places else float(values[at[name]]) for name in lags}
+    before = {name: quantities[places[name]][_TIME] if name in places else float(values[at[name]]) for name in lags}
     found = exchanged_lags(fit.system, ranges, values, {lump: before[name] for name, lump in lags.items()})
     if found is None:
         return None
     start, own = found
     for name, lump in lags.items():
         if name in places:
-            quantities[places[name]][TIME] = own[lump]
+            quantities[places[name]][_TIME] = own[lump]
         else:
             start[at[name]] = np.clip(own[lump], ranges.lower[at[name]], ranges.upper[at[name]])
     v = structure.start(start, quantities)
@@ -103,11 +103,15 @@ def with_exchanged_lags(fit: Refit) -> Refit:
     for _ in range(1 + len(lags_of(fit))):  # each may have to be exchanged beside the others
         if fit.variance < _LARGE:
             return fit
-        better = next((other for other in map(lambda some: exchanged(fit, some), _choices(fit))
-                       if other is not None and other.rss < _FAR_LESS * fit.rss and leaves_far_less(other, fit)), None)
-        if better is None:
+        try:
+            better = next((other for other in (exchanged(fit, some) for some in choices_of(lags_of(fit)))
+                           if other is not None and other.rss < _FAR_LESS * fit.rss and leaves_far_less(other, fit)),
+                          None)
+            if better is None:
+                return fit
+            fit = fitted(better.structure, better.v, better.floor, better.levels)
+        except (Diverged, InputError):  # the model runs away from there: the fit stays
             return fit
-        fit = fitted(better.structure, better.v, better.floor, better.levels)
     return fit
 
 
@@ -126,13 +130,6 @@ def leaves_far_less(other: Refit, fit: Refit) -> bool:
     if not fit.structure.coarse:
         return extended(fit, other.structure, other.v, _FEW).rss < _FAR_LESS * fit.rss
     return leaves_far_less(exact(other), exact(fit))
-
-
-def _choices(fit: Refit) -> list[dict[str, str]]:
-    """Every lag by itself, then those of all thermometers together."""
-    lags = lags_of(fit)
-    thermometers = {name: lump for name, lump in lags.items() if name.startswith("sensors.")}
-    return [*({name: lump} for name, lump in lags.items()), *([thermometers] if len(thermometers) > 1 else [])]
 
 
 def _effects(fit: Refit) -> dict[str, int]:

@@ -8,7 +8,7 @@ the wrong one of their two thermometers alone, none with this rule (`tests/diagn
 A heat that the model lacks at a lump that little else touches warms its thermometer alone, and so does an offset. So
 a constant heat and shares of heaters at that lump are asked as well, and a gain of the thermometer: in the network as
 it is, because what a finer one would change takes over most of a heat, and nothing of an offset. A simulated motor
-whose magnet is heated with its speed, which no effect of the catalog says, had an offset of the magnet's thermometer;
+whose magnet is heated with its speed, with no effect tried that says so, had an offset of the magnet's thermometer;
 beside a finer network heats did 0.74 of what it did, in the network as it is 0.98 to 1.01
 (`tests/diagnosis/test_motor.py`). Of 12 offsets that are there (bars, plates, stacks, housings of foreign truth) the
 others did up to 0.78, and once 0.91.
@@ -75,10 +75,13 @@ def heats_instead(round_: Accepted, fit: Refit, less: Refit, names: Sequence[str
     known, sensor = _known(round_, fit), round_.best.candidate.where[0]
     at = (sensor, system.sensors[sensor].lump)
     others = [one for one in less.testable(candidates(system, asked)) if one.where[-1] in at and one.key not in known]
-    plain, own = exact(less), _refitted(round_.best.candidate, exact(less))
-    least = plain.rss - _AS_WELL * (plain.rss - min((entry.fit.rss for entry in own), default=plain.rss))
+    plain = exact(less)
+    own = [entry.fit.rss for entry in _refitted(round_.best.candidate, plain)]
+    if not own:  # nothing to compare with
+        return []
+    least = plain.rss - _AS_WELL * (plain.rss - min(own))
     return [entry for one in others if any(found.fit.rss < least for found in _refitted(one, plain))
-            for entry in (_refitted(one, less) if less.structure.coarse else _refitted(one, plain))]
+            for entry in _refitted(one, less)]
 
 
 def _off(round_: Accepted, system: System) -> bool:

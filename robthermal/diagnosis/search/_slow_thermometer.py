@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ...errors import Diverged, InputError
-from ..fit import Refit, exchanged, extended, fitted, lags_of
+from ..fit import Refit, exchanged, extended, fitted, lag_name, lags_of
 from ._decide import Accepted
 from ._short_list import Entry
 from ._stages import begin
@@ -54,12 +54,15 @@ def _exchanged(nominal: Refit, lag: Entry) -> Refit | None:
     try:
         alone = extended(nominal, structure, structure.carried(nominal.structure, nominal.v, [lag.found]))
         other = exchanged(alone, {name: lump for name, lump in lags_of(alone).items()
-                                  if name == f"sensors.{lag.candidate.where[0]}.time_constant"})
+                                  if name == lag_name(*lag.candidate.key)})
     except (Diverged, InputError):
         return None
     return _renewed(other)
 
 
 def _renewed(fit: Refit | None) -> Refit | None:
-    """With filters and noise levels of its own."""
-    return None if fit is None else fitted(fit.structure, fit.v, fit.floor, fit.levels)
+    """With filters and noise levels of its own; None where the model runs away from there."""
+    try:
+        return None if fit is None else fitted(fit.structure, fit.v, fit.floor, fit.levels)
+    except (Diverged, InputError):
+        return None
