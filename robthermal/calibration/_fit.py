@@ -54,6 +54,8 @@ class Fit(Estimates):
         Model evaluations the optimizer tried.
     outcome : Outcome
         Codes "converged", "at_bound", "undetermined" (not ok), "not_converged" (not ok).
+    other_optima : tuple of ndarray, shape (p,)
+        Other values of all parameters that explain the data as well; `ranges` hold these too.
     remarks : tuple of str
         What was taken for granted about the records, a sentence or three each: an ambient that they do not hold, when
         their means were taken.
