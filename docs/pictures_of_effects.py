@@ -48,6 +48,7 @@ PICTURES = {
     "condensation": Picture(("plate",), {"conductance": 0.6, "dew_point": 293.15}),
     "heat_source": Picture(("plate",), {"heat": 1.0}),
     "hidden_mass": Picture(("plate",), {"capacity": 60.0, "time_constant": 200.0}),
+    "path_mass": Picture(("sink-room",), {"capacity": 800.0, "ratio": 0.5}, "sink"),
     "periodic_load": Picture(("plate",), {"heat": 1.0, "period": 400.0, "phase": 0.0}),
     "input_gain": Picture(("heater",), {"gain": 0.2}, "sample"),
     "input_offset": Picture(("m1",), {"offset": 0.15}),

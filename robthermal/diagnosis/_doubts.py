@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 from scipy.constants import Stefan_Boltzmann
 
 from .._celsius import ZERO_CELSIUS
-from ..thermal import System
+from ..thermal import System, parameter_in_words
 from ._found import Found
 from ._judge import Name, Verdict
 from .effects import AMBIENT_DRIFT, Candidate
@@ -50,6 +51,31 @@ def nothing_fitted(nominal: Refit, verdict: Verdict) -> list[str]:
         return []
     return ["The system has no fit table, so its numbers were taken as right: a wrong one can pass for what is "
             "missing. Put what is not known for certain under [fit], with its range."]
+
+
+def at_bounds(fit: Refit, verdict: Verdict) -> list[str]:
+    """Numbers that the fit with the answer puts at an end of their range, a sentence; an end of 0 is no choice.
+
+    Parameters
+    ----------
+    fit : Refit
+        Fit with all that was accepted.
+    verdict : str
+        Of the answer.
+    """
+    ranges = fit.structure.ranges
+    values = ranges.values(fit.v[:fit.structure.n_parameters])
+    ended = []
+    for i in np.flatnonzero(ranges.at_bound(values)):
+        low = values[i] - ranges.lower[i] < ranges.upper[i] - values[i]
+        end = ranges.lower[i] if low else ranges.upper[i]
+        if end:
+            what = " and ".join(map(parameter_in_words, ranges.members[i]))
+            ended.append(f"{what} at its {'lower' if low else 'upper'} end, {end:.4g}")
+    if verdict == "consistent" or not ended:
+        return []
+    return [f"The fit puts {', '.join(ended)}: the range in [fit] is too narrow, or something that the model lacks "
+            "pulls it there. Widen it, or doubt what is named beside it."]
 
 
 def place_undecided(effects: Sequence[Name], alternatives: Sequence[Sequence[Name]]) -> list[str]:

@@ -16,6 +16,7 @@ from ._augment import augmented
 from ._changed import Compared, changed
 from ._doubts import (
     ambients_in_words,
+    at_bounds,
     doubts,
     far_ambients,
     held_ambients,
@@ -316,6 +317,7 @@ def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
         said += periods_undecided(state.rounds, verdict != "named")
         said += late_by_rows(state.fit)
         said += surfaces(found.effects)
+    said += at_bounds(state.fit, verdict)
     said += held_ambients(nominal)
     said += may_drift(nominal) if verdict == "unexplained" else far_ambients(found.ambients, nominal.system)
     said += may_be_the_supply(nominal.system, state.fit.structure.effects)

@@ -8,8 +8,8 @@ import robthermal as rt
 CURRENT, BOX = {"m1": (0.0, 0.5), "m2": (0.0, 0.5)}, (280.0, 330.0)
 PLACES = {"module": "m1", "lump": "x6", "ambient": "room", "link": "x1-x3", "sensor": "T6", "input": "heater",
           "input or module": "m1"}
-OWN = {"natural_convection", "radiation", "missing_link", "missing_ambient_link", "hidden_mass", "sensor_lag",
-       "sensor_offset", "sensor_gain", "seebeck_slope", "resistance_slope", "conductance_slope",
+OWN = {"natural_convection", "radiation", "missing_link", "missing_ambient_link", "hidden_mass", "path_mass",
+       "sensor_lag", "sensor_offset", "sensor_gain", "seebeck_slope", "resistance_slope", "conductance_slope",
        "driven_heat"}  # plain system content: a heater with another gain
 FOLLOWING = {"heater_power_slope"}  # a heat that the certificates of a network know
 COUNTED = {"heat_source", "sensor_self_heating", "periodic_load", "input_feedthrough", "input_gain_slope",

@@ -45,6 +45,7 @@ CASES = [
     ("missing_ambient_link", ["cold", "room"], {"conductance": 0.3}), ("heat_source", ["cold"], {"heat": 0.8}),
     ("sensor_self_heating", ["T_cold"], {"heat": 0.4}), ("lead_heating", ["plate", "m"], {"resistance": 0.6}),
     ("hidden_mass", ["plate"], {"capacity": 8.0, "time_constant": 25.0}),
+    ("path_mass", ["hot-room"], {"capacity": 12.0, "ratio": 0.4}),
     ("input_gain", ["q"], {"gain": 0.3}), ("input_gain", ["m"], {"gain": -0.2}),
     ("input_offset", ["q"], {"offset": 0.5}), ("input_offset", ["m"], {"offset": 0.2}),
     ("input_saturation", ["q"], {"cubic": 0.03}), ("input_saturation", ["m"], {"cubic": 0.1}),
@@ -84,6 +85,9 @@ def heat_added(effect: str, p: dict, y: Sequence[float], acting: Sequence[float]
         case "hidden_mass":
             flow = p["capacity"] / p["time_constant"] * (extra - plate)
             return {"plate": flow}, -flow / p["capacity"]
+        case "path_mass":  # 0.9 W/K, of whose resistance 0.4/1.4 lie before the mass
+            before, after = 0.9 * 1.4 / 0.4 * (extra - hot), 0.9 * 1.4 * (ambient - extra)
+            return {"hot": before - 0.9 * (ambient - hot)}, (after - before) / p["capacity"]
         case "natural_convection":
             return {"plate": p["gain"] * abs(ambient - plate) ** p["exponent"] * (ambient - plate)}, 0.0
         case "radiation":
@@ -146,7 +150,8 @@ def truth(effect: str, where: list, p: dict, run: rt.Record) -> np.ndarray:
         return [into["plate"] / 20, into["cold"] / 6, into["hot"] / 9, d_extra, d_lag]
 
     start_lag = {"q": q, "m": m}[where[0]][0] if effect == "input_lag" else 0.0
-    y = np.array([T0 + 0.5, T0 - 1.0, T0 + 2.0, 0.0 if effect == "hysteresis" else T0 + 0.5, start_lag])
+    extra = {"hysteresis": 0.0, "path_mass": T0 + 2.0 / 1.4}.get(effect, T0 + 0.5)
+    y = np.array([T0 + 0.5, T0 - 1.0, T0 + 2.0, extra, start_lag])
     out = [y[:3]]
     for k in range(N - 1):
         inside = {p["delay"] % H} if effect == "input_delay" else set()
@@ -216,7 +221,7 @@ def test_sensitivities_are_the_derivatives(effect, where, values):
 def test_sensitivities_at_zero_are_one_sided_derivatives(effect, where, values):
     run, kind = record(start=60.0), rt.thermal.effects()[effect]
     size = next(name for name in values if name in kind.sizes)
-    if size == "clip" or effect == "hidden_mass":
+    if size == "clip" or effect.endswith("_mass"):
         pytest.skip("has no zero")
     shape = {name: value for name, value in values.items() if name not in kind.sizes}
     added = rt.thermal.add_effect(without_slope(effect), effect, where, {**shape, size: 0.0})
@@ -235,7 +240,8 @@ def everything() -> rt.System:
     """All effects without memory at once: they must not disturb each other's derivatives."""
     system = bench()
     for effect, where, values in CASES:
-        if effect in ("hysteresis", "hidden_mass", "input_delay", "input_lag", "periodic_load", "conductance_step"):
+        if effect in ("hysteresis", "hidden_mass", "path_mass", "input_delay", "input_lag", "periodic_load",
+                      "conductance_step"):
             continue
         if values.keys() & {"clip", "gain_slope"} or effect.endswith("_slope") and where == ["m"]:
             continue

@@ -77,6 +77,12 @@ def test_heat_in_proportion_to_a_column_is_in_the_text(full, drive):
     compare(system.with_parameters({"sensors.T_sample.delay": 2.0}), drive(n=8, seed=3, system=system), 2e-4)
 
 
+def test_a_mass_within_a_path_is_in_the_text(full, drive):
+    cooled = rt.thermal.add_effect(full, "missing_ambient_link", ["hot", "room"], {"conductance": 0.5}).system
+    system = rt.thermal.add_effect(cooled, "path_mass", ["hot-room"], {"capacity": 30.0, "ratio": 0.6}).system
+    compare(system.with_parameters({"sensors.T_sample.delay": 2.0}), drive(n=8, seed=3, system=system), 2e-4)
+
+
 def test_voltages_are_outputs_of_the_text(full, drive):
     volt = {"volt": {"module": "tem", "gain": 1.02, "offset": 0.01, "lead_resistance": 0.1}}
     system = rt.System(**{**dict(full), "sensors": {**full.sensors, **volt}})
@@ -88,7 +94,7 @@ def test_voltages_are_outputs_of_the_text(full, drive):
 
 def test_every_effect_of_the_catalog_is_tested():
     assert set(EFFECTS) == {effect for group in GROUPS for effect in group}
-    assert set(EFFECTS) | {"missing_ambient_link", "driven_heat"} == set(rt.thermal.effects())
+    assert set(EFFECTS) | {"missing_ambient_link", "driven_heat", "path_mass"} == set(rt.thermal.effects())
 
 
 def test_all_effects_at_once(full, drive):

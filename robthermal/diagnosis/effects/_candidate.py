@@ -10,6 +10,7 @@ from ...errors import InputError
 from ...thermal import System
 from ...thermal.effects import Effect, Quantity, TrialContext, effects
 from ._ambient_drift import LIKE, ambient_drift, as_slow, conductances
+from ._scale import to_scale
 
 Where = tuple[str, ...]
 
@@ -137,7 +138,7 @@ def candidates(system: System, names: Iterable[str] | None = None, unrecorded: S
     ['seebeck_slope(m1)', 'seebeck_slope(m2)']
     """
     chosen = chosen_effects(names)
-    found = [Candidate(_with_units(effect, system, tuple(where)), tuple(where))
+    found = [Candidate(_with_units(to_scale(effect, system), system, tuple(where)), tuple(where))
              for effect in chosen for where in effect.places(system)]
     if unrecorded and any(effect.name == LIKE for effect in chosen):
         return _with_drifts(found, system, unrecorded)

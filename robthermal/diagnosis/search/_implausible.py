@@ -23,6 +23,7 @@ from ..fit import Refit
 _LAGS = ("sensor_lag", "input_lag")
 _HALF, _MARGIN = 0.5, 1.0  # of the heat of condensation, and K by which all must be colder than its dew point
 _BY_ITSELF = 0.25  # relative: by so much radiation and natural convection change a conductance over tens of kelvins
+_SWINGS = 0.3  # of what a column moves beside a ramp
 FASTEST = 3.0 / 60.0  # K/s: air that is cooled or heated by cycling equipment changes by 1 to 2 K per minute
 
 
@@ -56,17 +57,37 @@ def implausible(candidate: Candidate, fit: Refit, values: Mapping[str, float], t
                 "memory of its polarity: something else settles from the start of a record on")
     if candidate.effect.name == "condensation":
         return _from_no_air(candidate.where[0], fit, values["dew_point"])
-    return _slow_or_fast(candidate, span, values, twins) if candidate.effect.paired else ""
+    return _slow_or_fast(candidate, span, values, twins, fit) if candidate.effect.paired else ""
 
 
-def _slow_or_fast(candidate: Candidate, span: float, values: Mapping[str, float], twins: Sequence[Twin]) -> str:
+def _slow_or_fast(candidate: Candidate, span: float, values: Mapping[str, float], twins: Sequence[Twin], fit: Refit
+                  ) -> str:
     """Why something does not come and go like this."""
     if candidate.effect.name == AMBIENT_DRIFT:
         rate = 2.0 * math.pi * abs(values["difference"]) / values["period"]
         return "" if rate <= FASTEST else f"{candidate.where[0]} would change by {60.0 * rate:.2g} K per minute"
-    if values["period"] <= span or any(twin.candidate.effect.name == AMBIENT_DRIFT for twin in twins):
+    if any(twin.candidate.effect.name == AMBIENT_DRIFT for twin in twins):
         return ""
-    return f"its period of {values['period']:.3g} s is longer than the record, of {span:.3g} s"
+    if values["period"] > span:
+        return f"its period of {values['period']:.3g} s is longer than the record, of {span:.3g} s"
+    column = _swinging(fit, values["period"])
+    return column and (f"its period of {values['period']:.3g} s is that in which {column} swings, which is recorded: "
+                       "the machine answers to that otherwise than the model")
+
+
+def _swinging(fit: Refit, period: float) -> str:
+    """A recorded input or ambient of which a sine of this period is a good part, beside a ramp; "" if there is none."""
+    for path in fit.records:
+        record = path.one.record
+        t = record.time - record.time[0]
+        ramp = np.column_stack([np.ones_like(t), t / max(float(t[-1]), 1e-9)])
+        sine = np.column_stack([ramp, np.cos(2.0 * np.pi * t / period), np.sin(2.0 * np.pi * t / period)])
+        for name in record.input_names:
+            column = record[name] - record[name].mean()
+            plain, left = (column - A @ np.linalg.lstsq(A, column, rcond=None)[0] for A in (ramp, sine))
+            if float(left @ left) < (1.0 - _SWINGS) * float(plain @ plain):
+                return name
+    return ""
 
 
 def _from_no_air(lump: str, fit: Refit, dew_point: float) -> str:

@@ -169,25 +169,33 @@ def refit_short_list(fit: Refit, scores: Scores, *, length: int = LENGTH, tried:
             picked.append(i)
     origin, failed = Origin(fit), {}
     entries: list[Entry] = []
+    doubtful: list[Entry] = []  # no name as they are now: none is given up for being behind them
     for i in picked:
         best = max((entry.delta_bic for entry in entries), default=0.0)
         promise = fit.n_readings * math.log(fit.rss / promised(fit, scores, i))
         if promise < _PROMISED * best - BEHIND:
             continue
         try:
-            entries.append(entry_of(origin, scores.candidates[i], float(scores.size[i]), float(scores.p_value[i]),
-                                    scores.twins(i), best, promise))
+            entry = entry_of(origin, scores.candidates[i], float(scores.size[i]), float(scores.p_value[i]),
+                             scores.twins(i), best, promise)
+            (doubtful if _refused(entry) else entries).append(entry)
         except (Diverged, InputError) as error:
             failed[scores.candidates[i].key] = str(error)
-    entries = _from_the_best(origin, entries)
-    likely = []
-    for entry in _reconsidered(fit, map(finished, competitive(entries)), tried):
-        why = implausible(entry.candidate, entry.fit, entry.found, entry.twins)
-        if why:
-            failed[entry.candidate.key] = why
-        else:
-            likely.append(entry)
-    return ShortList(fit, tuple(likely), failed)
+    entries = competitive(_from_the_best(origin, entries))
+    done = _plausible(map(finished, [*entries, *doubtful]), failed)
+    return ShortList(fit, tuple(_plausible(_reconsidered(fit, done, tried), failed)), failed)
+
+
+def _refused(entry: Entry) -> str:
+    """Why no machine shows this; empty if one may."""
+    return implausible(entry.candidate, entry.fit, entry.found, entry.twins)
+
+
+def _plausible(entries: Iterable[Entry], failed: dict[Key, str]) -> list[Entry]:
+    """Those that a machine may show; why it cannot be the others is added to `failed`."""
+    why = [(entry, _refused(entry)) for entry in entries]
+    failed.update((entry.candidate.key, refused) for entry, refused in why if refused)
+    return [entry for entry, refused in why if not refused]
 
 
 def _from_the_best(origin: Origin, entries: list[Entry]) -> list[Entry]:

@@ -30,6 +30,7 @@ WORDS = {  # {0}, {1}: the parts it acts on, in the order of the catalog
     "missing_ambient_link": "a heat path from {0} to {1}",
     "missing_link": "a heat path between {0} and {1}",
     "natural_convection": "natural convection from {0} to {1}",
+    "path_mass": "a mass within the path {0}",
     "periodic_load": "a periodic heat into {0}",
     "radiation": "radiation from {0} to {1}",
     "resistance_slope": "the slope of the resistance of {0} over temperature",

@@ -101,6 +101,15 @@ def _hidden_mass(plant: Plant, where: tuple[str, ...], v: Values, first: int) ->
                    links={**plant.links, (where[0], behind): v["capacity"] / v["time_constant"]}), Hidden()
 
 
+def _path_mass(plant: Plant, where: tuple[str, ...], v: Values, first: int) -> tuple[Plant, Hidden]:
+    lump, ambient = where[0].split("-")
+    within, share = f"within {where[0]}", v["ratio"] / (1.0 + v["ratio"])
+    links = {pair: G for pair, G in plant.links.items() if pair != (lump, ambient)}
+    G = plant.links[lump, ambient]
+    return replace(plant, capacity={**plant.capacity, within: v["capacity"]},
+                   links={**links, (lump, within): G / share, (within, ambient): G / (1.0 - share)}), Hidden()
+
+
 def _hysteresis(plant: Plant, where: tuple[str, ...], v: Values, first: int) -> tuple[Plant, Hidden]:
     k, cold = _column(plant, where[0]), _lump(plant, plant.modules[where[0]].cold)
 
@@ -238,6 +247,7 @@ CHANGES: dict[str, Change] = {
     "joule_split": _in_module(_split, "split"), "hysteresis": _hysteresis, "lead_heating": _lead,
     "natural_convection": _exchange(_natural), "radiation": _exchange(_radiation), "missing_link": _link,
     "missing_ambient_link": _link, "conductance_step": _step, "heat_source": _constant, "hidden_mass": _hidden_mass,
+    "path_mass": _path_mass,
     "periodic_load": _periodic, "condensation": _condensation, "input_offset": _offset,
     "input_saturation": _saturation, "input_lag": _input_lag, "input_delay": _input_delay,
     "heater_power_slope": _power_slope, "input_feedthrough": _feedthrough, "sensor_lag": _sensor_lag,

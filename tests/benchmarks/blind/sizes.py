@@ -22,6 +22,7 @@ SIZES: dict[str, dict[str, tuple[tuple[str, ...], str, float, float, bool]]] = {
         "missing_ambient_link": (("plate", "room"), "conductance", 6e-4, 0.03, False),
         "lead_heating": (("plate", "m1"), "resistance", 0.007, 0.15, False),
         "hidden_mass": (("sample",), "capacity", 0.15, 10.0, False),
+        "path_mass": (("sink-room",), "capacity", 100.0, 3000.0, False),
         "input_saturation": (("m1",), "cubic", 2e-4, 0.006, False),
         "sensor_lag": (("Ts",), "time_constant", 0.15, 6.0, False),
         "sensor_gain": (("Tp",), "gain", 5e-4, 0.02, True),
@@ -37,6 +38,7 @@ SIZES: dict[str, dict[str, tuple[tuple[str, ...], str, float, float, bool]]] = {
         "missing_ambient_link": (("right", "room"), "conductance", 0.001, 0.06, False),
         "lead_heating": (("right", "m2"), "resistance", 0.015, 0.3, False),
         "hidden_mass": (("right",), "capacity", 1.0, 25.0, False),
+        "path_mass": (("sink1-room",), "capacity", 100.0, 3000.0, False),
         "input_saturation": (("m2",), "cubic", 4e-4, 0.01, False),
         "input_lag": (("m1",), "time_constant", 0.1, 6.0, False),
         "sensor_lag": (("Tr",), "time_constant", 0.15, 6.0, False),
@@ -48,6 +50,7 @@ SIZES: dict[str, dict[str, tuple[tuple[str, ...], str, float, float, bool]]] = {
         "missing_link": (("left", "right"), "conductance", 0.001, 0.05, False),
         "missing_ambient_link": (("right", "room"), "conductance", 0.0027, 0.08, False),
         "hidden_mass": (("left",), "capacity", 0.35, 12.0, False),
+        "path_mass": (("frame-room",), "capacity", 10.0, 500.0, False),
         "input_saturation": (("q1",), "cubic", 4e-6, 2e-4, False),
         "input_lag": (("q2",), "time_constant", 0.35, 8.0, False),
         "input_delay": (("q1",), "delay", 0.1, 4.0, False),
@@ -77,6 +80,8 @@ def _shape(effect: str, rng: np.random.Generator) -> dict[str, float]:
     length = N_TRAIN * H
     if effect == "hidden_mass":
         return {"time_constant": float(np.exp(rng.uniform(np.log(40.0), np.log(200.0))))}
+    if effect == "path_mass":
+        return {"ratio": float(np.exp(rng.uniform(np.log(0.3), np.log(3.0))))}
     if effect == "hysteresis":
         return {"time_constant": float(np.exp(rng.uniform(np.log(30.0), np.log(150.0))))}
     if effect == "natural_convection":
