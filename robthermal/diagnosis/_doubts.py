@@ -14,7 +14,7 @@ from ._found import Found
 from ._judge import Name, Verdict
 from .effects import AMBIENT_DRIFT, Candidate
 from .fit import FoundAmbient, Refit, found_ambients
-from .search import Accepted, other_periods
+from .search import MASSES, Accepted, other_periods
 
 _LIKE_THE_ROOM = ("heat_source", "ambient_gradient")  # constants that a warmer or colder room gives too
 _SURE, _FAR = 3.0, 1.0  # standard deviations, and K: a room farther from what the system says may be something else
@@ -89,8 +89,13 @@ def place_undecided(effects: Sequence[Name], alternatives: Sequence[Sequence[Nam
         The same effect at neighboring lumps, for each of them.
     """
     said = []
-    for (_, where), others in zip(effects, alternatives, strict=True):
-        if others:
+    for (name, where), others in zip(effects, alternatives, strict=True):
+        if others and name in MASSES:
+            listed = " or ".join(f"hangs on {at[0]}" if one == MASSES[0] else f"lies within the path {at[0]}"
+                                 for one, at in ((name, where), *others))
+            said.append(f"The records do not tell whether this mass {listed}: one answer, because where a lump ends is "
+                        "the model's choice. The augmented model has the first.")
+        elif others:
             places = " or between ".join(" and ".join(at) for at in (where, *(at for _, at in others)))
             said.append(f"The records do not tell whether this path goes between {places}: neighboring lumps are one "
                         "answer, because where a lump ends is the model's choice. The augmented model has the first.")

@@ -12,6 +12,7 @@ from ._joint_check import checked_jointly as checked_jointly
 from ._joint_sets import EffectSet as EffectSet
 from ._joint_sets import refit_set as refit_set
 from ._neighbors import ALIKE as ALIKE
+from ._neighbors import MASSES as MASSES
 from ._neighbors import one_place as one_place
 from ._neighbors import with_neighbors as with_neighbors
 from ._other_end import with_other_end as with_other_end
@@ -44,10 +45,10 @@ from ._stages import validate as validate
 from ._state import SearchState as SearchState
 from ._wider_noise import with_wider_noise as with_wider_noise
 
-__all__ = ["ALIKE", "Accepted", "Decision", "EffectSet", "Entry", "JointCheck", "JointSelection", "SearchState",
-           "ShortList", "accept", "begin", "beside", "between_trials", "checked_jointly", "compare", "decide",
-           "exchange", "from_slow_thermometer", "heats_instead", "implausible_names", "leaves_large_misfit", "needed",
-           "one_place", "other_periods", "other_thermometers", "quantities_of", "reconsider", "refit_candidates",
-           "refit_set", "refit_short_list", "resolve_alternatives", "resolve_places", "revise", "revised",
-           "ruled_out", "select_jointly", "shortlist", "validate", "with_neighbors", "with_other_end",
+__all__ = ["ALIKE", "MASSES", "Accepted", "Decision", "EffectSet", "Entry", "JointCheck", "JointSelection",
+           "SearchState", "ShortList", "accept", "begin", "beside", "between_trials", "checked_jointly", "compare",
+           "decide", "exchange", "from_slow_thermometer", "heats_instead", "implausible_names", "leaves_large_misfit",
+           "needed", "one_place", "other_periods", "other_thermometers", "quantities_of", "reconsider",
+           "refit_candidates", "refit_set", "refit_short_list", "resolve_alternatives", "resolve_places", "revise",
+           "revised", "ruled_out", "select_jointly", "shortlist", "validate", "with_neighbors", "with_other_end",
            "with_wider_noise", "without", "without_contradicted"]

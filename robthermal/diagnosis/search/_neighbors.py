@@ -14,13 +14,15 @@ from ._decide import Accepted
 from ._short_list import Entry, Key, refit_short_list
 
 PATHS = ("missing_link", "missing_ambient_link")  # to a lump, and to what that lump is cooled by
+MASSES = ("hidden_mass", "path_mass")  # on a lump, and within a path that begins there
 ALIKE = 0.9  # of the decrease of the sum of squares: a rival that reaches it is as good where the model is not exact
 
 
 def with_neighbors(round_: Accepted, names: Sequence[str] | None = None) -> Accepted:
     """List beside a heat path those to neighboring lumps, refitted, that do nearly all that it does.
 
-    Of a path to a lump that an ambient cools the other place is that ambient, and the reverse.
+    Of a path to a lump that an ambient cools the other place is that ambient, and the reverse; of a mass on a lump the
+    path from there to an ambient.
 
     A path from the middle of a lump looks in a coarse network as if it came from between that lump and the next; the
     sum of squares decides for one of them beyond every statistical doubt, and can be wrong. A face of a module and the
@@ -52,12 +54,13 @@ def with_neighbors(round_: Accepted, names: Sequence[str] | None = None) -> Acce
 def _near(round_: Accepted, names: Sequence[str] | None) -> list[Candidate]:
     """Other places of the path, without those that are listed."""
     best, before = round_.best.candidate, round_.before
-    if len(best.where) != 2:  # no path: a drift of an ambient is not in the catalog, either
+    if len(best.where) != 2 and best.effect.name not in MASSES:  # a drift of an ambient is not in the catalog, either
         return []
     known, system = {entry.candidate.key for entry in round_.contenders}, before.structure.base
     asked = {best.effect.name}
-    if asked <= set(PATHS) and (names is None or set(PATHS) <= set(names)):
-        asked |= set(PATHS)
+    for kind in (set(PATHS), set(MASSES)):
+        if asked <= kind and (names is None or kind <= set(names)):
+            asked = kind
     return [one for one in before.testable(candidates(system, sorted(asked))) if one.key not in known
             and (neighboring(system, one, best) or beside_an_ambient(system, one, best))]
 
@@ -65,13 +68,18 @@ def _near(round_: Accepted, names: Sequence[str] | None) -> list[Candidate]:
 def neighboring(system: System, one: Candidate, other: Candidate) -> bool:
     """Whether a heat path is another one with its lumps, one or both, exchanged for neighbors of theirs.
 
+    Or a mass hangs on a lump, and another one lies within a path that leads from there to an ambient.
+
     Parameters
     ----------
     system : System
         Network with the links that make neighbors.
     one, other : Candidate
-        Candidates of the same effect.
+        Candidates of the same effect, or of the two for masses.
     """
+    if {one.effect.name, other.effect.name} <= set(MASSES):
+        return one.key != other.key and "path_mass" in (one.effect.name, other.effect.name) and (
+            _bearer(system, one) == _bearer(system, other))
     nodes = {*system.lumps, *system.ambients}
     if one.effect.name != other.effect.name or set(one.where) == set(other.where) or not all(
             len(at.where) == 2 and nodes >= set(at.where) for at in (one, other)):
@@ -80,6 +88,13 @@ def neighboring(system: System, one: Candidate, other: Candidate) -> bool:
     (a, b), (c, d) = one.where, other.where
     return any(all(p == q or frozenset((p, q)) in joined for p, q in ends)
                for ends in (((a, c), (b, d)), ((a, d), (b, c))))
+
+
+def _bearer(system: System, mass: Candidate) -> set[str]:
+    """The lump on which a mass hangs, or at which its path begins."""
+    if mass.effect.name != "path_mass":
+        return set(mass.where)
+    return {end for link in system.links if link.name == mass.where[0] for end in link.between if end in system.lumps}
 
 
 def beside_an_ambient(system: System, one: Candidate, other: Candidate) -> bool:
