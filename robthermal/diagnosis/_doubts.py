@@ -18,6 +18,7 @@ from .search import MASSES, Accepted, other_periods
 
 _LIKE_THE_ROOM = ("heat_source", "ambient_gradient")  # constants that a warmer or colder room gives too
 _SURE, _FAR = 3.0, 1.0  # standard deviations, and K: a room farther from what the system says may be something else
+_NOISIER = 1.6  # times what is declared; 1.4 times is allowed for
 _LISTED = 4  # records by name
 
 
@@ -76,6 +77,34 @@ def at_bounds(fit: Refit, verdict: Verdict) -> list[str]:
         return []
     return [f"The fit puts {', '.join(ended)}: the range in [fit] is too narrow, or something that the model lacks "
             "pulls it there. Widen it, or doubt what is named beside it."]
+
+
+def noise_above_declared(fit: Refit, verdict: Verdict) -> list[str]:
+    """Where sensors are noisier than declared and nothing else is seen in what is left, a sentence.
+
+    The tests of what is left ask for its shape: white noise of any size passes them.
+
+    Parameters
+    ----------
+    fit : Refit
+        Fit with all that was accepted, whose levels are at their limit.
+    verdict : str
+        Of an answer without a remainder.
+    """
+    if verdict == "unexplained" or not fit.levels.sensors_exhausted:
+        return []
+    found = []
+    for name, declared in fit.floor.noise.items():
+        z = [own[:, one.sensors.index(name)] for own, one in zip(fit.innovations(), fit.structure.data, strict=True)
+             if name in one.sensors]
+        left = declared * fit.levels.noise.get(name, 1.0) * float(np.sqrt(np.mean(np.concatenate(z) ** 2)))
+        if left > _NOISIER * declared:
+            unit = fit.floor.units.get(name, "K")
+            found.append(f"{left:.2g} {unit} are left at {name}, where {declared:.2g} {unit} are declared")
+    if not found:
+        return []
+    return [f"{'; '.join(found)}: to these records that is noise. Declare it, if the sensor has as much; if it has less, "
+            "something is missing that they do not show."]
 
 
 def place_undecided(effects: Sequence[Name], alternatives: Sequence[Sequence[Name]]) -> list[str]:

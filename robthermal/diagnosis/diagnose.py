@@ -23,6 +23,7 @@ from ._doubts import (
     may_be_the_room,
     may_be_the_supply,
     may_drift,
+    noise_above_declared,
     nothing_fitted,
     periods_undecided,
     place_undecided,
@@ -322,6 +323,7 @@ def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
     said += may_drift(nominal) if verdict == "unexplained" else far_ambients(found.ambients, nominal.system)
     said += may_be_the_supply(nominal.system, state.fit.structure.effects)
     if judged.plain is None:
+        said += noise_above_declared(state.fit, verdict)
         return (*said, *may_be_the_room(nominal, state.fit.structure.effects))
     listed = [name for one, others in zip(found.effects, found.alternatives, strict=True)
               for name in (one.key, *others)]
