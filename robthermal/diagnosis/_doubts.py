@@ -103,8 +103,8 @@ def noise_above_declared(fit: Refit, verdict: Verdict) -> list[str]:
             found.append(f"{left:.2g} {unit} are left at {name}, where {declared:.2g} {unit} are declared")
     if not found:
         return []
-    return [f"{'; '.join(found)}: to these records that is noise. Declare it, if the sensor has as much; if it has less, "
-            "something is missing that they do not show."]
+    return [f"{'; '.join(found)}: to these records that is noise. Declare it, if the sensor has as much; if it has "
+            "less, something is missing that they do not show."]
 
 
 def place_undecided(effects: Sequence[Name], alternatives: Sequence[Sequence[Name]]) -> list[str]:

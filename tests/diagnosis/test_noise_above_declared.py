@@ -19,8 +19,8 @@ def diagnosed(noise: float, lag: float) -> rt.Diagnosis:
                          "links.bar-room.conductance": {"lower": 0.1, "upper": 2.0}})
     rng = np.random.default_rng(8)
     heater = np.repeat(rng.uniform(0.0, 6.0, 20), 30)
-    drive = rt.Record(sample_time=5.0, inputs=np.column_stack([heater, np.full(600, 295.0)]), outputs=np.zeros((600, 0)),
-                      input_names=["heater", "room"], output_names=[])
+    drive = rt.Record(sample_time=5.0, inputs=np.column_stack([heater, np.full(600, 295.0)]),
+                      outputs=np.zeros((600, 0)), input_names=["heater", "room"], output_names=[])
     run = rt.thermal.simulate(bar.with_parameters({"sensors.T.time_constant": lag}), drive)
     readings = run.outputs + noise * rng.standard_normal((600, 1))
     return rt.diagnose(bar, run.with_outputs(readings), effects=["sensor_lag", "missing_link", "heat_source"])
