@@ -40,6 +40,7 @@ PICTURES = {
     "lead_heating": Picture(("plate", "m1"), {"resistance": 0.4}),
     "missing_link": Picture(("sample", "sink"), {"conductance": 0.15}, "sample"),
     "missing_ambient_link": Picture(("plate", "room"), {"conductance": 0.15}),
+    "coolant_warming": Picture(("room",), {"warming": 0.4}, "sink"),
     "natural_convection": Picture(("sink", "room"), {"gain": 0.4, "exponent": 0.25}, "sink"),
     "radiation": Picture(("sample", "room"), {"coefficient": 1.5e-9}, "sample"),
     "ambient_gradient": Picture(("sink",), {"difference": 1.5}, "sink"),
@@ -79,6 +80,13 @@ def plant() -> rt.System:
         sensors={f"T_{name}": {"lump": name} for name in ("sample", "plate", "sink")})
 
 
+def piped(system: rt.System) -> rt.System:
+    """The same with the sample in the stream that cools the sink, before it."""
+    sample = rt.thermal.Link(between=("sample", "room"), conductance=1.0)
+    room = rt.thermal.Ambient(temperature=ROOM, coolant=("sample", "sink"))
+    return rt.System(**{**dict(system), "ambients": {"room": room}, "links": (*system.links, sample)})
+
+
 def excitation() -> rt.Record:
     """Heater alone, current of both signs, both together, then a warmer room; a rotor that turns now and then."""
     heater = np.repeat([0.0, 4.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0], 30)
@@ -92,9 +100,9 @@ def excitation() -> rt.Record:
 def readings(name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Reading of the picture's sensor without and with the effect [K]."""
     picture, drive = PICTURES[name], excitation()
-    column = f"T_{picture.sensor}"
-    changed = rt.thermal.add_effect(plant(), name, picture.where, picture.values).system
-    return rt.thermal.simulate(plant(), drive)[column], rt.thermal.simulate(changed, drive)[column]
+    column, usual = f"T_{picture.sensor}", piped(plant()) if name == "coolant_warming" else plant()
+    changed = rt.thermal.add_effect(usual, name, picture.where, picture.values).system
+    return rt.thermal.simulate(usual, drive)[column], rt.thermal.simulate(changed, drive)[column]
 
 
 def title(name: str) -> str:

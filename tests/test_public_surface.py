@@ -114,7 +114,7 @@ SURFACE = {
     """,
     "thermal": """
         AddedEffect Ambient Assembly Condensation Contact DatasheetFit Drive EffectKind Equations Equilibrium
-        Feedthrough FitRange Hysteresis Input Inversion Layer Lead Linear Link LoadCurve Lump Material MatrixImport
+        Feedthrough FitRange Flow Hysteresis Input Inversion Layer Lead Linear Link LoadCurve Lump Material MatrixImport
         Module ModuleParameters ModulePoint Natural Periodic PolynomialFit Polynomials Properties PwmRipple Rating
         Reduction DrivableRange drivable_range pwm_ripple Supply
         Sensor SheetInversion SinkSize SplitLump SteadyState Step Stepper System ThermalCode Trajectory add_effect

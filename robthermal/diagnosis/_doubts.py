@@ -238,6 +238,41 @@ def may_be_the_room(nominal: Refit, effects: Sequence[Candidate]) -> list[str]:
     return said
 
 
+def may_be_a_coolant(system: System, effects: Sequence[Candidate]) -> list[str]:
+    """Where heat gets from one lump to another that one ambient cools: it may flow past them, a sentence.
+
+    Parameters
+    ----------
+    system : System
+        Nominal system, whose ambients may say which lumps they pass.
+    effects : sequence of Candidate
+        What was added to it.
+    """
+    for one in effects:
+        pair = {"missing_link": one.where, "input_feedthrough": (_heated(system, one.where[0]), one.where[-1])
+                }.get(one.effect.name, ())
+        both = {_coldest(system, lump) for lump in pair if lump in system.lumps}
+        ambient = both.pop() if len(both) == 1 else ""
+        if ambient and not system.ambients[ambient].coolant:
+            listed = ", ".join(f'"{lump}"' for lump in system.lumps if _coldest(system, lump) == ambient)
+            return [f"{' and '.join(pair)} are cooled by {ambient} before all: if it flows from one to the other, it "
+                    f"carries heat there, which looks like {one.label}. Say so with coolant = [{listed}], in the order "
+                    f"of the flow, in [ambients.{ambient}], and diagnose again."]
+    return []
+
+
+def _heated(system: System, heater: str) -> str:
+    return system.inputs[heater].lump if heater in system.inputs else ""
+
+
+def _coldest(system: System, lump: str) -> str:
+    """The ambient that takes more of its heat than anything else does; "" if another lump does."""
+    paths = [(link.conductance, end) for link in system.links if lump in link.between
+             for end in link.between if end != lump]
+    strongest = max(paths, default=(0.0, ""))[1]
+    return strongest if strongest in system.ambients else ""
+
+
 def may_be_the_supply(system: System, effects: Sequence[Candidate]) -> list[str]:
     """Which swings of heat may be the supply of a heater of their lump, a sentence each.
 

@@ -20,6 +20,7 @@ from ._doubts import (
     doubts,
     far_ambients,
     held_ambients,
+    may_be_a_coolant,
     may_be_the_room,
     may_be_the_supply,
     may_drift,
@@ -321,6 +322,7 @@ def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
     said += at_bounds(state.fit, verdict)
     said += held_ambients(nominal)
     said += may_drift(nominal) if verdict == "unexplained" else far_ambients(found.ambients, nominal.system)
+    said += may_be_a_coolant(nominal.system, state.fit.structure.effects)
     said += may_be_the_supply(nominal.system, state.fit.structure.effects)
     if judged.plain is None:
         said += noise_above_declared(state.fit, verdict)

@@ -40,6 +40,7 @@ from ._parts import Condensation as Condensation
 from ._parts import Drive as Drive
 from ._parts import Feedthrough as Feedthrough
 from ._parts import FitRange as FitRange
+from ._parts import Flow as Flow
 from ._parts import Hysteresis as Hysteresis
 from ._parts import Input as Input
 from ._parts import Lead as Lead
@@ -85,8 +86,8 @@ from .effects import add_effect as add_effect
 from .effects import effects as effects
 
 __all__ = ["AddedEffect", "Ambient", "Assembly", "Condensation", "Contact", "DatasheetFit", "DrivableRange", "Drive",
-           "EffectKind", "Equations", "Equilibrium", "Feedthrough", "FitRange", "Hysteresis", "Input", "Inversion",
-           "Layer", "Lead", "Linear", "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module",
+           "EffectKind", "Equations", "Equilibrium", "Feedthrough", "FitRange", "Flow", "Hysteresis", "Input",
+           "Inversion", "Layer", "Lead", "Linear", "Link", "LoadCurve", "Lump", "Material", "MatrixImport", "Module",
            "ModuleParameters", "ModulePoint", "Natural", "Periodic", "PolynomialFit", "Polynomials", "Properties",
            "PwmRipple", "Rating", "Reduction", "Sensor", "SheetInversion", "SinkSize", "SplitLump", "SteadyState",
            "Step", "Stepper", "Supply", "System", "ThermalCode", "Trajectory", "add_effect", "constant_losses",

@@ -66,7 +66,7 @@ def _sensors(eq: Equations, layout: Layout, F: Array) -> None:
 def _meters(eq: Equations, layout: Layout, F: Array, D: Array) -> None:
     n, ambients = len(eq.capacity), eq.drives.ambients
     conductance = eq.dense[1][:, ambients]
-    F[layout.ambient_meters, :n] = -conductance.T
+    F[layout.ambient_meters, :n] = eq.carried - conductance.T
     D[layout.ambient_meters, ambients] = np.diag(conductance.sum(axis=0))
     D[layout.ambient_meters, eq.drives.one] = conductance.T @ eq.gradient
     for i, heater in enumerate(eq.system.inputs.values()):

@@ -163,3 +163,33 @@ class Lead(Part):
         if not self.name:
             object.__setattr__(self, "name", f"{self.module}-{self.lump}")
         return self
+
+
+class Flow(Part):
+    """Coolant that one lump has warmed reaches another one: heat conductance (T_upstream - T_ambient) into that.
+
+    Parameters
+    ----------
+    upstream, downstream : str
+        The lump that warms the coolant, and the one that it reaches.
+    ambient : str
+        The coolant as it enters.
+    conductance : float
+        Heat carried per kelvin that the upstream lump is warmer than the entering coolant [W/K].
+    name : str
+        Name of the flow; default "upstream-downstream".
+    """
+
+    upstream: Name
+    downstream: Name
+    ambient: Name
+    conductance: NonNegative = 0.0
+    name: str = ""
+
+    @model_validator(mode="after")
+    def _named(self) -> Flow:
+        if self.upstream == self.downstream:
+            raise ValueError(f"both lumps are {self.upstream!r}: a flow leads from one lump to another")
+        if not self.name:
+            object.__setattr__(self, "name", f"{self.upstream}-{self.downstream}")
+        return self

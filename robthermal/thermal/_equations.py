@@ -83,7 +83,22 @@ class Equations:
         ends += [(i[m.hot], i[m.cold], m.conductance.value) for m in self.system.modules.values()]
         a, b, g = (np.array(column) for column in zip(*ends, strict=True)) if ends else (np.zeros(0),) * 3
         a, b = a.astype(np.intp), b.astype(np.intp)
-        return np.concatenate([a, a, b, b]), np.concatenate([a, b, b, a]), np.concatenate([-g, g, -g, g])
+        carried = [(i[f.upstream], i[f.downstream], i[f.ambient], f.conductance) for f in self.system.flows]
+        up, down, coolant = (np.array([row[k] for row in carried], np.intp) for k in range(3))
+        c = np.array([row[3] for row in carried], float)  # what the coolant brings it no longer takes out
+        return (np.concatenate([a, a, b, b, down, down, coolant, coolant]),
+                np.concatenate([a, b, b, a, up, coolant, up, coolant]),
+                np.concatenate([-g, g, -g, g, c, -c, -c, c]))
+
+    @cached_property
+    def carried(self) -> NDArray[np.float64]:
+        """Heat that every coolant brings downstream beyond what its conductances say, (n_ambients, n) [W/K]."""
+        n, found = len(self.system.lumps), np.zeros((len(self.system.ambients), len(self.system.lumps)))
+        for flow in self.system.flows:
+            row = self.index[flow.ambient] - n
+            found[row, self.index[flow.upstream]] += flow.conductance
+            found[row, self.index[flow.downstream]] -= flow.conductance
+        return found
 
     @cached_property
     def _network(self) -> scipy.sparse.csr_array:

@@ -244,7 +244,7 @@ def _lines(system: System) -> Iterator[str]:
     yield "[system]"
     yield f"name = {_string(system.name)}"
     yield f"temperature_unit = {_string(system.temperature_unit)}"
-    for table in ("ambients", "lumps", "links", "inputs", "modules", "leads", "sensors"):
+    for table in ("ambients", "lumps", "links", "inputs", "modules", "leads", "flows", "sensors"):
         parts = getattr(system, table)
         named = [(f"[[{table}]]", part) for part in parts] if table in LISTED else [
             (f"[{table}.{_key(name)}]", part) for name, part in parts.items()]

@@ -160,7 +160,7 @@ def _flows(eq: Equations, x: Array, u: Array) -> Array:
     """Heat from every ambient, electrical power of every module, heat of every heater, and of all other sources [W]."""
     n, w, one = len(eq.capacity), eq.drives(u), eq.drives.one
     conductance = eq.D[:, eq.drives.ambients]
-    ambient = conductance.sum(axis=0) * w[eq.drives.ambients] - conductance.T @ (x - eq.gradient)
+    ambient = conductance.sum(axis=0) * w[eq.drives.ambients] - conductance.T @ (x - eq.gradient) + eq.carried @ x
     constant = eq.D[:, [one]].sum() - (conductance.T @ eq.gradient).sum()
     power = {"modules": np.zeros(len(eq.system.modules)), "sources": np.array([constant]),
              "inputs": np.array([heater.gain for heater in eq.system.inputs.values()]) * w[:len(eq.system.inputs)]}

@@ -74,6 +74,10 @@ def format_modelica(system: System, name: str = "") -> str:
     for lead in system.leads:
         resistance = text.parameter(f"R_{lead.name}", lead.resistance, "Ohm")
         heats[lead.lump].append(f"+ {resistance} * {_driven(text, lead.module)}^2")
+    for flow in system.flows:
+        conductance = text.parameter(f"flow_{flow.name}", flow.conductance, "W/K")
+        heats[flow.downstream].append(
+            f"+ {conductance} * ({text[flow.upstream]} - {_seen(system, text, flow.ambient, flow.downstream)})")
     for heater in system.inputs:
         _heater(system, text, heater, heats)
     for sensor, own in system.sensors.items():

@@ -106,6 +106,7 @@ def _effects_exist(system: System) -> None:
             raise InputError(f"the lead name {lead.name!r} is used twice", where=where,
                              remedy='Add name = "…" to one of them, or add up their resistances.')
         names.add(lead.name)
+    _flows_exist(system)
     for name, heater in system.inputs.items():
         if heater.feedthrough is not None:
             where = f"[inputs.{name}] feedthrough"
@@ -113,6 +114,29 @@ def _effects_exist(system: System) -> None:
             if heater.feedthrough.lump == heater.lump:
                 raise InputError(f"{heater.lump!r} is the heater's own lump", where=where, expected="another lump",
                                  remedy="Name the lump that receives a share of its heat.")
+
+
+def _flows_exist(system: System) -> None:
+    for name, ambient in system.ambients.items():
+        where = f"[ambients.{name}] coolant"
+        for lump in ambient.coolant:
+            _known(lump, system.lumps, where, "lumps")
+            if not any(set(link.between) == {lump, name} for link in system.links):
+                raise InputError(f"{lump!r} has no link to {name!r}", where=where, expected="lumps that it cools",
+                                 remedy="Add the link, or leave the lump out.")
+        if len(set(ambient.coolant)) < len(ambient.coolant):
+            raise InputError("a lump is listed twice", where=where, expected="every lump once, in order",
+                             remedy="Split a lump that the coolant passes twice.")
+    names: set[str] = set()
+    for number, flow in enumerate(system.flows, start=1):
+        where = f"[[flows]] number {number}"
+        _known(flow.upstream, system.lumps, f"{where} upstream", "a lump")
+        _known(flow.downstream, system.lumps, f"{where} downstream", "a lump")
+        _known(flow.ambient, system.ambients, f"{where} ambient", "an ambient")
+        if flow.name in names:
+            raise InputError(f"the flow name {flow.name!r} is used twice", where=where,
+                             remedy='Add name = "…" to one of them, or add up their conductances.')
+        names.add(flow.name)
 
 
 def _path_to_ambient(system: System) -> None:

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from ._system import System
 
 # the linear equations are affine in each of these, so that a difference is an exact derivative
-AFFINE = {("links", "conductance"), ("modules", "conductance.value"), ("modules", "hysteresis.heat"),
-          ("inputs", "gain"), ("inputs", "feedthrough.share"), ("lumps", "heat"), ("lumps", "gradient"),
-          ("lumps", "periodic.heat"), ("sensors", "self_heating")}
+AFFINE = {("links", "conductance"), ("flows", "conductance"), ("modules", "conductance.value"),
+          ("modules", "hysteresis.heat"), ("inputs", "gain"), ("inputs", "feedthrough.share"), ("lumps", "heat"),
+          ("lumps", "gradient"), ("lumps", "periodic.heat"), ("sensors", "self_heating")}
 Flows = tuple[Array, Array]
 
 

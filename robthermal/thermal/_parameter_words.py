@@ -39,6 +39,7 @@ WORDS: dict[str, dict[str, tuple[str, str]]] = {  # by table and key: words and 
         "thomson": ("Thomson coefficient of {0}", "V/K"), "joule_split": ("split of the Joule heat of {0}", "-"),
         "hysteresis.heat": ("heat of the hysteresis of {0}", "W"),
         "hysteresis.time_constant": ("time constant of the hysteresis of {0}", "s"), **_DRIVE},
+    "flows": {"conductance": ("heat that the coolant carries by {0}", "W/K")},
     "leads": {"resistance": ("lead resistance of {0}", "Ω")},
     "sensors": {
         "noise": ("noise of {0}", "K"), "time_constant": ("lag of {0}", "s"), "offset": ("offset of {0}", "K"),

@@ -27,17 +27,17 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "inputs": ("gain", *_DRIVE, "drive.before", "power_slope", "feedthrough.share"),
     "modules": (*_LINEAR, "reference_temperature", "thomson", "joule_split", "hysteresis.heat",
                 "hysteresis.time_constant", *_DRIVE, "drive.before"),
-    "leads": ("resistance",),
+    "leads": ("resistance",), "flows": ("conductance",),
     "sensors": ("noise", "time_constant", "offset", "gain", "delay", "self_heating", "lead_resistance",
                 "initial"),
 }
 _WORDS = {field: tuple(field.split(".")) for fields in FIELDS.values() for field in fields}
-LISTED = ("links", "leads")  # tables that are lists of named parts
+LISTED = ("links", "leads", "flows")  # tables that are lists of named parts
 _KEPT = 4096  # names whose places are remembered: a fit asks for the same ones thousands of times
 
 
 def parts_of(system: System, table: str) -> Mapping[str, Part]:
-    """Parts of one table by name (links and leads too)."""
+    """Parts of one table by name (those of lists too)."""
     parts = getattr(system, table)
     return {part.name: part for part in parts} if table in LISTED else parts
 
@@ -54,7 +54,8 @@ def parameters(system: System) -> Iterator[tuple[str, float]]:
 EFFECT_SIZES = {  # zero or absent: the effect is not there
     "lumps": ("heat", "gradient", "periodic.heat", "condensation.conductance"),
     "links": ("step.relative", "follow.relative"),
-    "inputs": (*_DRIVE, "power_slope", "feedthrough.share"), "leads": ("resistance",), "sensors": ("self_heating",),
+    "inputs": (*_DRIVE, "power_slope", "feedthrough.share"), "leads": ("resistance",), "flows": ("conductance",),
+    "sensors": ("self_heating",),
     "modules": ("thomson", "joule_split", "hysteresis.heat", *_DRIVE)}
 
 
@@ -128,7 +129,7 @@ def _get(part: Any, field: str) -> float | None:
 def _changed(part: Part, fields: Mapping[str, float], where: str) -> Part:
     data = _given(part)
     if "name" in type(part).model_fields:
-        data["name"] = getattr(part, "name")  # noqa: B009 - only links and leads have one
+        data["name"] = getattr(part, "name")  # noqa: B009 - only parts of lists have one
     for field, value in fields.items():
         *outer, last = _WORDS[field]
         target = data

@@ -9,6 +9,7 @@ from pydantic import Field, field_validator, model_validator
 from ._effect_parts import Condensation as Condensation
 from ._effect_parts import Drive as Drive
 from ._effect_parts import Feedthrough as Feedthrough
+from ._effect_parts import Flow as Flow
 from ._effect_parts import Follow as Follow
 from ._effect_parts import Hysteresis as Hysteresis
 from ._effect_parts import Lead as Lead
@@ -29,9 +30,12 @@ class Ambient(Part):
     ----------
     temperature : float
         Used when a record has no column of this name [K].
+    coolant : tuple of str
+        Lumps that it passes, in this order; a diagnosis asks whether it gets warm on the way.
     """
 
     temperature: Kelvin
+    coolant: tuple[Name, ...] = ()
 
 
 class Lump(Part):

@@ -9,12 +9,14 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from ..errors import InputError
+from ._parameters import LISTED
 from ._parts import (
     Ambient,
     Condensation,
     Drive,
     Feedthrough,
     FitRange,
+    Flow,
     Follow,
     Hysteresis,
     Input,
@@ -31,11 +33,11 @@ from ._parts import (
 )
 
 _PARTS: dict[str, type[Part]] = {"ambients": Ambient, "lumps": Lump, "links": Link, "inputs": Input,
-                                 "modules": Module, "leads": Lead, "sensors": Sensor, "fit": FitRange}
+                                 "modules": Module, "leads": Lead, "flows": Flow, "sensors": Sensor, "fit": FitRange}
 _INNER: dict[str, type[Part]] = {"natural": Natural, "seebeck": Linear, "resistance": Linear, "conductance": Linear,
                                  "drive": Drive, "hysteresis": Hysteresis, "periodic": Periodic, "step": Step,
                                  "condensation": Condensation, "feedthrough": Feedthrough, "follow": Follow}
-_TOP = ("system", "ambients", "lumps", "links", "inputs", "modules", "leads", "sensors", "fit")
+_TOP = ("system", "ambients", "lumps", "links", "inputs", "modules", "leads", "flows", "sensors", "fit")
 
 _LISTED = 5  # further places in a message
 _EXPECTED = {
@@ -88,7 +90,7 @@ def _place(loc: tuple[int | str, ...]) -> tuple[str, str]:
     words = [str(word) for word in loc if word != "[key]"]
     if len(words) <= 1:
         return "[system]", words[0] if words else ""
-    if words[0] in ("links", "leads"):
+    if words[0] in LISTED:
         return f"[[{words[0]}]] number {int(words[1]) + 1}", ".".join(words[2:])
     if words[0] == "fit":
         return f'[fit] "{words[1]}"', ".".join(words[2:])

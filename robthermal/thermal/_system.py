@@ -16,7 +16,7 @@ from ._draw_network import draw_network
 from ._equations import Equations
 from ._network import check_network
 from ._parameters import parameters, present_effects, read_parameter, replace_parameters
-from ._parts import Ambient, FitRange, Input, Lead, Link, Lump, Module, Name, Part, Sensor
+from ._parts import Ambient, FitRange, Flow, Input, Lead, Link, Lump, Module, Name, Part, Sensor
 from ._refusals import refusal
 
 
@@ -35,6 +35,8 @@ class System(Part):
         Heat paths between lumps, or to ambients.
     leads : sequence of Lead
         Heat of the modules' leads and contacts.
+    flows : sequence of Flow
+        Heat that a coolant carries from one lump to another.
     fit : mapping
         Parameter name to `FitRange`.
     temperature_unit : {"K", "degC"}
@@ -64,6 +66,7 @@ class System(Part):
     inputs: dict[Name, Input] = {}
     modules: dict[Name, Module] = {}
     leads: tuple[Lead, ...] = ()
+    flows: tuple[Flow, ...] = ()
     sensors: dict[Name, Sensor] = {}
     fit: dict[str, FitRange] = {}
     record: dict[str, Any] = {}
@@ -77,14 +80,14 @@ class System(Part):
         check_network(self)
 
     def __repr__(self) -> str:
-        tables = ("lumps", "links", "modules", "leads", "inputs", "sensors")
+        tables = ("lumps", "links", "modules", "leads", "flows", "inputs", "sensors")
         counts = {table: len(getattr(self, table)) for table in tables}
         return f"<System {self.name!r}: {', '.join(f'{n} {table}' for table, n in counts.items() if n)}>"
 
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
-        tables = ("lumps", "links", "modules", "leads", "ambients", "inputs", "sensors")
+        tables = ("lumps", "links", "modules", "leads", "flows", "ambients", "inputs", "sensors")
         parts = {name: getattr(self, name) for name in tables}
         names = {name: ["-".join(one.between) for one in found] if name == "links" else list(map(str, found))
                  for name, found in parts.items()}

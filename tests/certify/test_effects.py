@@ -20,6 +20,7 @@ FORCING = {*COUNTED, "ambient_gradient"}
 def machine() -> rt.System:
     system = rt.systems.two_module()
     return rt.System(**{field: getattr(system, field) for field in type(system).model_fields}
+                     | {"ambients": {"room": {"temperature": 298.15, "coolant": ("x1", "x2")}}}
                      | {"inputs": {"heater": {"lump": "x1", "limits": (0.0, 1.0)}}})
 
 

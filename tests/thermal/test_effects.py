@@ -15,7 +15,8 @@ H, N, T0 = 4.0, 22, 296.0
 def bench() -> rt.System:
     """Plate (heater) - cold | module | hot - room, everything linked to the room, all sensors."""
     return rt.System(
-        ambients={"room": {"temperature": T0}}, lumps={name: {"capacity": c, "initial": T0 + d} for name, c, d in (
+        ambients={"room": {"temperature": T0, "coolant": ("plate", "hot")}},
+        lumps={name: {"capacity": c, "initial": T0 + d} for name, c, d in (
             ("plate", 20.0, 0.5), ("cold", 6.0, -1.0), ("hot", 9.0, 2.0))},
         links=[{"between": ("plate", "cold"), "conductance": 1.5}, {"between": ("hot", "room"), "conductance": 0.9},
                {"between": ("plate", "room"), "conductance": 0.06}],
@@ -45,6 +46,7 @@ CASES = [
     ("missing_ambient_link", ["cold", "room"], {"conductance": 0.3}), ("heat_source", ["cold"], {"heat": 0.8}),
     ("sensor_self_heating", ["T_cold"], {"heat": 0.4}), ("lead_heating", ["plate", "m"], {"resistance": 0.6}),
     ("hidden_mass", ["plate"], {"capacity": 8.0, "time_constant": 25.0}),
+    ("coolant_warming", ["room"], {"warming": 5.0}),
     ("path_mass", ["hot-room"], {"capacity": 12.0, "ratio": 0.4}),
     ("input_gain", ["q"], {"gain": 0.3}), ("input_gain", ["m"], {"gain": -0.2}),
     ("input_offset", ["q"], {"offset": 0.5}), ("input_offset", ["m"], {"offset": 0.2}),
@@ -85,6 +87,8 @@ def heat_added(effect: str, p: dict, y: Sequence[float], acting: Sequence[float]
         case "hidden_mass":
             flow = p["capacity"] / p["time_constant"] * (extra - plate)
             return {"plate": flow}, -flow / p["capacity"]
+        case "coolant_warming":  # 0.06 W/K at the plate warm it by 0.3 of their difference; 0.9 W/K take it up
+            return {"hot": 0.9 * 0.06 * p["warming"] * (plate - ambient)}, 0.0
         case "path_mass":  # 0.9 W/K, of whose resistance 0.4/1.4 lie before the mass
             before, after = 0.9 * 1.4 / 0.4 * (extra - hot), 0.9 * 1.4 * (ambient - extra)
             return {"hot": before - 0.9 * (ambient - hot)}, (after - before) / p["capacity"]
@@ -291,7 +295,7 @@ def test_all_effects_together_have_exact_sensitivities():
 
 @pytest.mark.parametrize("effect", ["heat_source", "ambient_gradient", "heater_power_slope", "lead_heating",
                                     "condensation", "thomson", "input_feedthrough", "input_gain",
-                                    "driven_conductance"])
+                                    "driven_conductance", "coolant_warming"])
 def test_large_networks_simulate_the_same(effect, monkeypatch):
     where, values = next((where, values) for name, where, values in CASES if name == effect)
     system = rt.thermal.add_effect(bench(), effect, where, values).system
@@ -376,6 +380,8 @@ def test_bad_effects_are_refused(arguments, message):
 @pytest.mark.parametrize(("table", "message"), [
     ("[[leads]]\nmodule = 'x'\nlump = 'a'\nresistance = 0.1", r"\[\[leads\]\] number 1 module"),
     ("[[leads]]\nmodul = 'x'\nlump = 'a'\nresistance = 0.1", "Did you mean 'module'"),
+    ("[[flows]]\nupstream = 'x'\ndownstream = 'a'\nambient = 'room'", r"\[\[flows\]\] number 1 upstream"),
+    ("[[flows]]\nupstream = 'a'\ndownstream = 'a'\nambient = 'room'", "from one lump to another"),
     ("[inputs.q]\nlump = 'a'\ndrive = { gian = 0.1 }", "Did you mean 'gain'"),
     ("[inputs.q]\nlump = 'a'\nfeedthrough = { lump = 'b', share = 0.1 }", "feedthrough"),
     ("[inputs.q]\nlump = 'a'\nfeedthrough = { lump = 'b', share = 2.0 }", "at most 1"),

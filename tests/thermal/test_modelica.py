@@ -83,6 +83,16 @@ def test_a_mass_within_a_path_is_in_the_text(full, drive):
     compare(system.with_parameters({"sensors.T_sample.delay": 2.0}), drive(n=8, seed=3, system=system), 2e-4)
 
 
+def test_a_coolant_that_gets_warm_is_in_the_text(full, drive):
+    system = rt.thermal.add_effect(full, "missing_ambient_link", ["hot", "room"], {"conductance": 0.5}).system
+    system = rt.thermal.add_effect(system, "missing_ambient_link", ["plate", "room"], {"conductance": 0.7}).system
+    room = system.ambients["room"].model_copy(update={"coolant": ("plate", "hot")})
+    piped = rt.System(**{**dict(system), "ambients": {**system.ambients, "room": room}})
+    warmed = rt.thermal.add_effect(piped, "coolant_warming", ["room"], {"warming": 0.6}).system
+    assert warmed.parameter("flows.plate-hot.conductance") > 0.1
+    compare(warmed.with_parameters({"sensors.T_sample.delay": 2.0}), drive(n=8, seed=3, system=warmed), 2e-4)
+
+
 def test_voltages_are_outputs_of_the_text(full, drive):
     volt = {"volt": {"module": "tem", "gain": 1.02, "offset": 0.01, "lead_resistance": 0.1}}
     system = rt.System(**{**dict(full), "sensors": {**full.sensors, **volt}})
@@ -94,7 +104,8 @@ def test_voltages_are_outputs_of_the_text(full, drive):
 
 def test_every_effect_of_the_catalog_is_tested():
     assert set(EFFECTS) == {effect for group in GROUPS for effect in group}
-    assert set(EFFECTS) | {"missing_ambient_link", "driven_heat", "path_mass"} == set(rt.thermal.effects())
+    others = {"missing_ambient_link", "driven_heat", "path_mass", "coolant_warming"}
+    assert set(EFFECTS) | others == set(rt.thermal.effects())
 
 
 def test_all_effects_at_once(full, drive):

@@ -11,7 +11,8 @@ CLAIMED = {"Lump": {"capacity"}, "Link": {"name", "between", "conductance", "nat
            "Sensor": {"lump", "gain"}, "Input": set(),
            "System": {"name", "ambients", "lumps", "links", "modules", "sensors"}}
 # starts, noise, limits of inputs, what a sensor adds to its reading; an observer refuses lag, delay, voltages itself
-HARMLESS = {"Lump": {"disturbance", "initial"}, "Module": {"current_limits", "supply"}, "Ambient": {"temperature"},
+HARMLESS = {"Lump": {"disturbance", "initial"}, "Module": {"current_limits", "supply"},
+            "Ambient": {"temperature", "coolant"},
             "Sensor": {"noise", "offset", "time_constant", "delay", "module", "quantity", "lead_resistance", "initial",
                        "read"},
             "Input": {"lump", "gain", "limits", "unit"},

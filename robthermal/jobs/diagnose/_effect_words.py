@@ -12,6 +12,7 @@ WORDS = {  # {0}, {1}: the parts it acts on, in the order of the catalog
     "condensation": "condensation on {0}",
     "conductance_slope": "the slope of the conductance of {0} over temperature",
     "conductance_step": "a change of the conductance {0} during the record",
+    "coolant_warming": "the warming of {0} at the lumps that it passes",
     "driven_conductance": "a growth of the conductance {0} with {1}",
     "driven_heat": "a heat into {1} in proportion to {0}",
     "heat_source": "a constant heat into {0}",

@@ -75,7 +75,11 @@ def _add(system: System, where: Where, values: Values) -> System:
         limits = fit[key]
         fit[key] = limits.model_copy(update={part: value / share for part in ("lower", "upper", "sigma")
                                              if (value := getattr(limits, part)) is not None})
-    return system.model_copy(update={"lumps": {**system.lumps, name: mass}, "links": tuple(links), "fit": fit})
+    if not any(set(one.between) == {lump, ambient} for one in links):  # a coolant passes the mass now
+        passed = tuple(name if one == lump else one for one in outside.coolant)
+        outside = outside.model_copy(update={"coolant": passed} if passed else {})
+    return system.model_copy(update={"lumps": {**system.lumps, name: mass}, "links": tuple(links), "fit": fit,
+                                     "ambients": {**system.ambients, ambient: outside}})
 
 
 def _names(system: System, where: Where) -> dict[str, str]:
