@@ -251,10 +251,10 @@ def may_be_a_coolant(system: System, effects: Sequence[Candidate]) -> list[str]:
     for one in effects:
         pair = {"missing_link": one.where, "input_feedthrough": (_heated(system, one.where[0]), one.where[-1])
                 }.get(one.effect.name, ())
-        both = {_coldest(system, lump) for lump in pair if lump in system.lumps}
+        both = {_cooled_by(system, lump) for lump in pair if lump in system.lumps}
         ambient = both.pop() if len(both) == 1 else ""
         if ambient and not system.ambients[ambient].coolant:
-            listed = ", ".join(f'"{lump}"' for lump in system.lumps if _coldest(system, lump) == ambient)
+            listed = ", ".join(f'"{lump}"' for lump in system.lumps if _cooled_by(system, lump) == ambient)
             return [f"{' and '.join(pair)} are cooled by {ambient} before all: if it flows from one to the other, it "
                     f"carries heat there, which looks like {one.label}. Say so with coolant = [{listed}], in the order "
                     f"of the flow, in [ambients.{ambient}], and diagnose again."]
@@ -265,7 +265,7 @@ def _heated(system: System, heater: str) -> str:
     return system.inputs[heater].lump if heater in system.inputs else ""
 
 
-def _coldest(system: System, lump: str) -> str:
+def _cooled_by(system: System, lump: str) -> str:
     """The ambient that takes more of its heat than anything else does; "" if another lump does."""
     paths = [(link.conductance, end) for link in system.links if lump in link.between
              for end in link.between if end != lump]

@@ -51,6 +51,8 @@ def with_named_effects(system: System, named: Iterable[Found]) -> System:
         quantities = {quantity.name: quantity for form in known[one.effect].all_forms for quantity in form.quantities}
         for name, parameter in added.parameters.items():
             quantity, value = quantities.get(name), system.parameter(parameter)
+            if parameter.startswith("flows."):  # those of one coolant belong together
+                continue
             if value and quantity is not None and quantity.lower < quantity.upper:
                 fit[parameter] = FitRange(lower=min(value / _FACTOR, value * _FACTOR) if quantity.lower >= 0.0 else
                                           value - _FACTOR * abs(value), upper=value + _FACTOR * abs(value))

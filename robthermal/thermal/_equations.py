@@ -83,12 +83,15 @@ class Equations:
         ends += [(i[m.hot], i[m.cold], m.conductance.value) for m in self.system.modules.values()]
         a, b, g = (np.array(column) for column in zip(*ends, strict=True)) if ends else (np.zeros(0),) * 3
         a, b = a.astype(np.intp), b.astype(np.intp)
-        carried = [(i[f.upstream], i[f.downstream], i[f.ambient], f.conductance) for f in self.system.flows]
-        up, down, coolant = (np.array([row[k] for row in carried], np.intp) for k in range(3))
-        c = np.array([row[3] for row in carried], float)  # what the coolant brings it no longer takes out
-        return (np.concatenate([a, a, b, b, down, down, coolant, coolant]),
-                np.concatenate([a, b, b, a, up, coolant, up, coolant]),
-                np.concatenate([-g, g, -g, g, c, -c, -c, c]))
+        rows, columns = np.concatenate([a, a, b, b]), np.concatenate([a, b, b, a])
+        values = np.concatenate([-g, g, -g, g])
+        if not self.system.flows:
+            return rows, columns, values
+        up, down, coolant = (np.array([i[getattr(flow, end)] for flow in self.system.flows], np.intp)
+                             for end in ("upstream", "downstream", "ambient"))
+        c = np.array([flow.conductance for flow in self.system.flows])  # what it brings it no longer takes out
+        return (np.concatenate([rows, down, down, coolant, coolant]),
+                np.concatenate([columns, up, coolant, up, coolant]), np.concatenate([values, c, -c, -c, c]))
 
     @cached_property
     def carried(self) -> NDArray[np.float64]:

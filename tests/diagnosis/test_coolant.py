@@ -28,6 +28,9 @@ def test_the_warming_is_named_with_its_size(flow: float) -> None:
     carried = {one.name: one.conductance for one in answer.system.flows}
     assert carried["A-B"] == pytest.approx(G * G / flow, rel=0.02)
     assert carried["A-C"] == pytest.approx(G * G / flow * (1.0 - G / flow), rel=0.05)
+    augmented = rt.diagnosis.with_named_effects(system(("A", "B", "C")), answer.effects)
+    assert [one.name for one in augmented.flows] == ["A-B", "A-C", "B-C"]
+    assert not any(name.startswith("flows.") for name in augmented.fit)  # they belong together
     assert answer.gap["validation"].after < 1.1 * answer.gap["validation"].noise < 0.2 * answer.gap["validation"].before
 
 

@@ -76,13 +76,16 @@ def _slow_or_fast(candidate: Candidate, span: float, values: Mapping[str, float]
 
 
 def _swinging(fit: Refit, period: float) -> str:
-    """A recorded input or ambient of which a sine of this period is a good part, beside a ramp; "" if there is none."""
+    """A recorded ambient of which a sine of this period is a good part, beside a ramp; "" if there is none.
+
+    Inputs do not count: under feedback they follow a periodic heat.
+    """
     for path in fit.records:
         record = path.one.record
         t = record.time - record.time[0]
         ramp = np.column_stack([np.ones_like(t), t / max(float(t[-1]), 1e-9)])
         sine = np.column_stack([ramp, np.cos(2.0 * np.pi * t / period), np.sin(2.0 * np.pi * t / period)])
-        for name in record.input_names:
+        for name in (one for one in record.input_names if one in fit.system.ambients):
             column = record[name] - record[name].mean()
             plain, left = (column - A @ np.linalg.lstsq(A, column, rcond=None)[0] for A in (ramp, sine))
             if float(left @ left) < (1.0 - _SWINGS) * float(plain @ plain):
