@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from ...errors import Diverged, InputError
 from ...thermal import System
 from ..effects import Candidate, candidates
@@ -15,6 +17,7 @@ from ._short_list import Entry, Key, refit_short_list
 
 PATHS = ("missing_link", "missing_ambient_link")  # to a lump, and to what that lump is cooled by
 MASSES = ("hidden_mass", "path_mass")  # on a lump, and within a path that begins there
+_OFF = 1.05  # times an end of a range: nearer is at that end
 ALIKE = 0.9  # of the decrease of the sum of squares: a rival that reaches it is as good where the model is not exact
 
 
@@ -170,7 +173,14 @@ def _nearly_best(before: Refit, entries: Sequence[Entry], own: Candidate) -> lis
             asked = [*asked, beside]
         return all(of.get(entry.candidate.key, 0.0) > ALIKE * max(of.values(), default=0.0) for of in asked)
 
-    return [entry for entry in entries if entry.candidate.key != own.key and alike(entry)]
+    return [entry for entry in entries if entry.candidate.key != own.key and alike(entry) and not _at_an_end(entry)]
+
+
+def _at_an_end(entry: Entry) -> bool:
+    """Whether a mass within a path would lie at an end of it: there it hangs on the lump, or is not seen."""
+    ends = {quantity.name: (quantity.lower, quantity.upper) for quantity in entry.candidate.effect.quantities}
+    low, high = ends.get("ratio", (0.0, np.inf))
+    return entry.candidate.effect.name == "path_mass" and not low * _OFF < entry.found["ratio"] < high / _OFF
 
 
 def _decreases(before: Refit, entries: Sequence[Entry]) -> dict[Key, float]:

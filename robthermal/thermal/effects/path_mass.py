@@ -15,7 +15,8 @@ from ._response import RecordContext, Response, TrialContext, Values, Where
 from ._signatures import TIMES, follow, into, node
 
 _TINY = 1e-6  # of its lump's capacity: a mass that is not there yet
-_RATIOS = (0.2, 1.0, 5.0)
+_RATIOS = (0.3, 1.0, 3.0)
+_NEAREST = 0.1  # ratio: a mass nearer to the lump hangs on it, one as near to the ambient is not seen
 _STILL = 1e-9  # K: an ambient that moves less is constant
 
 
@@ -108,7 +109,7 @@ def _capacities(record: TrialContext, where: Where) -> list[float]:
     u = getattr(record, "u", None)  # a frequency response has none
     if u is None or np.ptp(u[:, record.system.exogenous_names.index(ambient)]) < _STILL:
         return []
-    return [4.0 * tau * link.conductance for tau in TIMES if record.h / 2 <= tau <= record.span / 3]
+    return [4.0 * tau * link.conductance for tau in TIMES[::2] if record.h / 2 <= tau <= record.span / 3]
 
 
 def _alike(system: System, where: Where) -> str:
@@ -135,7 +136,7 @@ EFFECT = Effect(
     where=("link",),
     places=_places,
     quantities=(Quantity("capacity", "J/K", 0.0, 1e5, grid=_capacities),
-                Quantity("ratio", "-", 1e-3, 1e3, grid=_RATIOS)),
+                Quantity("ratio", "-", _NEAREST, 1.0 / _NEAREST, grid=_RATIOS)),
     nonnegative=("capacity",),
     add=_ADD,
     signature=_stored,

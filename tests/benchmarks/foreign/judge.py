@@ -81,7 +81,10 @@ def answer(row: Row) -> str:
 
 
 def one_path(row: Row) -> bool:
-    """Whether every set is the truth, with at most the same heat path from and to neighboring lumps: one answer."""
+    """Whether every set is the truth, with at most the same heat path from and to neighboring lumps: one answer.
+
+    Or a mass on a lump and one within a path that leads from it.
+    """
     if answer(row) not in ("unique", "in the set"):
         return False
     joined = neighbors(row["key"].split("/")[0])
@@ -91,7 +94,11 @@ def one_path(row: Row) -> bool:
             all(p == q or frozenset((p, q)) in joined for p, q in zip(one, ends, strict=True))
             for ends in (other, other[::-1]))
 
-    return all(other[0] == name[0] and near(name[1], other[1])
+    def one_mass(one: list[Any], other: list[Any]) -> bool:
+        at, path = sorted((one, other))
+        return (at[0], path[0]) == ("hidden_mass", "path_mass") and at[1][0] in path[1][0].split("-")
+
+    return all((other[0] == name[0] and near(name[1], other[1])) or one_mass(name, other)
                for name, others in zip(row["names"], row["others"], strict=True) for other in others)
 
 
