@@ -62,8 +62,9 @@ def test_bounds_follow_the_machine() -> None:
     system = rt.thermal.parse_system(SYSTEM.format(most=300.0))
     upper = {one.effect.name: one.effect.size.upper for one in rt.diagnosis.candidates(system)}
     small = {one.effect.name: one.effect.size.upper for one in rt.diagnosis.candidates(rt.systems.two_module())}
-    assert upper["hidden_mass"] == upper["path_mass"] == 1e9 and small["hidden_mass"] == 1e5
+    assert upper["hidden_mass"] == upper["path_mass"] == 1e9 and small["hidden_mass"] < 3e5
     assert upper["heat_source"] == 4000.0 and small["heat_source"] < 1400.0
+    assert small["sensor_self_heating"] < 14.0  # no thermometer heats with kilowatts because a link is good
 
 
 def test_the_path_keeps_its_steady_state_its_name_and_its_range() -> None:
