@@ -60,6 +60,9 @@ def draw_network(system: System, ax: Any = None) -> Any:
     for name, module in system.modules.items():
         cold, hot = index[module.cold], index[module.hot]
         _module(ax, name, places[cold], places[hot], sizes[hot])
+    for flow in system.flows:
+        start, end = index[flow.upstream], index[flow.downstream]
+        _arrow(ax, places[start], places[end], sizes[end], linewidth=1.4, color="C0", linestyle="--")
     for node, place, size in zip(nodes, places, sizes, strict=True):
         _box(ax, node, place, size)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
@@ -97,13 +100,17 @@ def _box(ax: Any, node: _Node, place: Array, size: Array) -> None:
 
 def _module(ax: Any, name: str, cold: Array, hot: Array, size: Array) -> None:
     """A thick line from the cold to the hot face, ending in an arrow at the edge of the hot lump's box."""
-    along = cold - hot
-    share = float(np.min(np.divide(size / 2 + 0.03, np.abs(along), out=np.full(2, np.inf), where=along != 0)))
-    ax.annotate("", hot + min(share, 0.9) * along, cold, zorder=2, annotation_clip=False,
-                arrowprops={"arrowstyle": "-|>", "linewidth": 2.6, "color": "black", "shrinkA": 0, "shrinkB": 0,
-                            "mutation_scale": 13})
+    _arrow(ax, cold, hot, size, linewidth=2.6, color="black")
     ax.text(*(cold + hot) / 2, name.replace("$", r"\$"), ha="center", va="center", fontsize=8, fontstyle="italic",
             zorder=5, bbox={"facecolor": "white", "edgecolor": "black", "linewidth": 0.8, "pad": 1.6})
+
+
+def _arrow(ax: Any, start: Array, end: Array, size: Array, **style: Any) -> None:
+    """An arrow that ends at the edge of a box of this size."""
+    along = start - end
+    share = float(np.min(np.divide(size / 2 + 0.03, np.abs(along), out=np.full(2, np.inf), where=along != 0)))
+    ax.annotate("", end + min(share, 0.9) * along, start, zorder=2, annotation_clip=False,
+                arrowprops={"arrowstyle": "-|>", "shrinkA": 0, "shrinkB": 0, "mutation_scale": 13, **style})
 
 
 def _legend(ax: Any, system: System) -> None:
@@ -119,6 +126,7 @@ def _legend(ax: Any, system: System) -> None:
              (bool(system.ambients), Patch(facecolor="white", edgecolor="#666666", linestyle="--", label="ambient")),
              (bool(system.links), mark("heat path", color="#888888")),
              (bool(system.modules), mark("module: positive current pumps heat this way", linewidth=2.6, marker=">")),
+             (bool(system.flows), mark("coolant carries heat this way", color="C0", linestyle="--", marker=">")),
              (any(sensor.lump for sensor in system.sensors.values()), mark("sensor", linestyle="", marker="o")),
              (any(heats), mark("heater", linestyle="", marker="^")),
              (not all(heats), mark("recorded column that heats nothing", linestyle="", marker="D"))]

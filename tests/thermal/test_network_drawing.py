@@ -86,3 +86,15 @@ def test_quantities_have_the_unit_of_the_column_they_act_on() -> None:
     assert driven.effect.size.unit == "1/(rev/s)"
     offsets = {one.where: one.effect.size.unit for one in rt.diagnosis.candidates(cooled(), ["input_offset"])}
     assert offsets[("foil",)] == "W"
+
+
+def test_a_coolant_that_carries_heat_is_an_arrow_downstream() -> None:
+    def arrows(ax: Any) -> list[Any]:
+        return [text for text in ax.texts if getattr(text, "arrow_patch", None) is not None]
+
+    bar = chain(3)
+    flow = rt.thermal.Flow(upstream="x0", downstream="x2", ambient="room", conductance=0.2)
+    plain, piped = bar.plot(), rt.System(**{**dict(bar), "flows": (flow,)}).plot()
+    assert len(arrows(piped)) == 1 and not arrows(plain)
+    assert "coolant carries heat this way" in {text.get_text() for text in piped.get_legend().get_texts()}
+    plt.close("all")
