@@ -60,9 +60,18 @@ def _names_used_once(system: System) -> None:
             seen[name] = table
 
 
+def _once(name: str, names: set[str], where: str, kind: str, instead: str) -> None:
+    """Add a name to those of a list; refuse one that is there."""
+    if name in names:
+        raise InputError(f"the {kind} name {name!r} is used twice", where=where,
+                         remedy=f'Add name = "…" to one of them, or {instead}.')
+    names.add(name)
+
+
 def _links_exist(system: System) -> None:
     nodes = list(system.lumps) + list(system.ambients)
-    known, names = set(nodes), set()
+    known = set(nodes)
+    names: set[str] = set()
     for number, link in enumerate(system.links, start=1):
         where = f"[[links]] number {number}"
         for end in link.between:
@@ -71,10 +80,7 @@ def _links_exist(system: System) -> None:
         if not any(end in system.lumps for end in link.between):
             raise InputError(f"joins two ambients, {link.between[0]!r} and {link.between[1]!r}", where=where,
                              remedy="At least one end must be a lump.")
-        if link.name in names:
-            raise InputError(f"the link name {link.name!r} is used twice", where=where,
-                             remedy='Add name = "…" to one of them, or join them into one link.')
-        names.add(link.name)
+        _once(link.name, names, where, "link", "join them into one link")
 
 
 def _modules_exist(system: System) -> None:
@@ -102,10 +108,7 @@ def _effects_exist(system: System) -> None:
         where = f"[[leads]] number {number}"
         _known(lead.module, system.modules, f"{where} module", "a module")
         _known(lead.lump, system.lumps, f"{where} lump", "a lump")
-        if lead.name in names:
-            raise InputError(f"the lead name {lead.name!r} is used twice", where=where,
-                             remedy='Add name = "…" to one of them, or add up their resistances.')
-        names.add(lead.name)
+        _once(lead.name, names, where, "lead", "add up their resistances")
     _flows_exist(system)
     for name, heater in system.inputs.items():
         if heater.feedthrough is not None:
@@ -133,10 +136,7 @@ def _flows_exist(system: System) -> None:
         _known(flow.upstream, system.lumps, f"{where} upstream", "a lump")
         _known(flow.downstream, system.lumps, f"{where} downstream", "a lump")
         _known(flow.ambient, system.ambients, f"{where} ambient", "an ambient")
-        if flow.name in names:
-            raise InputError(f"the flow name {flow.name!r} is used twice", where=where,
-                             remedy='Add name = "…" to one of them, or add up their conductances.')
-        names.add(flow.name)
+        _once(flow.name, names, where, "flow", "add up their conductances")
 
 
 def _path_to_ambient(system: System) -> None:

@@ -32,6 +32,16 @@ def with_effect(effect: str) -> rt.System:
     return rt.thermal.add_effect(machine(), effect, where, {kind.sizes[0]: 0.05}).system
 
 
+def test_no_range_lets_a_flow_that_is_zero_into_a_claim():
+    still = rt.System(**{**dict(machine()), "flows": [{"upstream": "x1", "downstream": "x2", "ambient": "room"}]})
+    assert still.effects == ()
+    for claim in (lambda range_: rt.certify.contraction(still, current=CURRENT, temperature=BOX, parameters=range_),
+                  lambda range_: rt.certify.invariance(still, current=CURRENT, temperature=BOX, parameters=range_),
+                  lambda range_: rt.certify.runaway_free(still, current=CURRENT, parameters=range_)):
+        with pytest.raises(rt.InputError, match="flows.x1-x2.conductance"):
+            claim({"flows.x1-x2.conductance": (0.0, 0.5)})
+
+
 @pytest.mark.parametrize("effect", sorted(set(rt.thermal.effects()) - OWN - FOLLOWING))
 def test_every_new_effect_is_refused_or_is_no_part_of_the_jacobian(effect):
     system = with_effect(effect)

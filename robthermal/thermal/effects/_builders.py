@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -148,11 +148,27 @@ def joined(system: System, where: Where, **content: Any) -> System:
     **content : Any
         Keys of the link.
     """
-    taken, name, number = {link.name for link in system.links}, "-".join(where), 2
-    while name in taken:
-        name, number = f"{'-'.join(where)} {number}", number + 1
+    name = free_name("-".join(where), {link.name for link in system.links}, " ")
     link = Link(between=(where[0], where[1]), name=name, **content)
     return system.model_copy(update={"links": (*system.links, link)})
+
+
+def free_name(wanted: str, taken: Container[str], gap: str = "") -> str:
+    """The name wanted, with a number behind it where it is taken.
+
+    Parameters
+    ----------
+    wanted : str
+        Name of a new part.
+    taken : container of str
+        Names that others have.
+    gap : str
+        What stands between the name and its number.
+    """
+    name, number = wanted, 2
+    while name in taken:
+        name, number = f"{wanted}{gap}{number}", number + 1
+    return name
 
 
 def content_of(system: System) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from ..._all_pole import all_pole
 from .._system import System
 from ._response import Array, RecordContext, Response, Signature, Values, Where
 
+# s, what the record resolves of them
 TIMES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0, 10000.0, 30000.0, 100000.0)
 CONSTANT = "constant in time: a frequency response does not show it"
 ALTERED = "not linear and time-invariant: a frequency response does not show it"

@@ -7,7 +7,7 @@ from itertools import combinations
 
 from .._parts import Flow
 from .._system import System
-from ._builders import Builder
+from ._builders import Builder, free_name
 from ._effect import Effect, Quantity
 from ._response import Values, Where
 from ._signatures import by_heat
@@ -43,9 +43,7 @@ def _add(system: System, where: Where, values: Values) -> System:
     taken = {flow.name for flow in system.flows}
     flows = list(system.flows)
     for upstream, downstream, conductance in _carried(_taken(system, where[0]), values["warming"]):
-        name, number = f"{upstream}-{downstream}", 2
-        while name in taken:
-            name, number = f"{upstream}-{downstream} {number}", number + 1
+        name = free_name(f"{upstream}-{downstream}", taken, " ")
         flows.append(Flow(upstream=upstream, downstream=downstream, ambient=where[0], conductance=conductance,
                           name=name))
         taken.add(name)

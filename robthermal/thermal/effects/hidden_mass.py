@@ -6,7 +6,7 @@ import numpy as np
 
 from .._parts import Lump
 from .._system import System
-from ._builders import Builder, joined
+from ._builders import Builder, free_name, joined
 from ._effect import Effect, Quantity
 from ._places import lumps
 from ._response import RecordContext, Response, Values, Where
@@ -16,10 +16,7 @@ _TINY = 1e-6  # of its lump's capacity: a hidden mass that is not there yet
 
 
 def _name(system: System, where: Where) -> str:
-    name, number = f"{where[0]}_hidden", 2
-    while name in system.lumps:
-        name, number = f"{where[0]}_hidden{number}", number + 1
-    return name
+    return free_name(f"{where[0]}_hidden", system.lumps)
 
 
 def _add(system: System, where: Where, values: Values) -> System:

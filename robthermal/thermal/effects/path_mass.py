@@ -9,7 +9,7 @@ import numpy as np
 from ...errors import InputError
 from .._parts import Link, Lump
 from .._system import System
-from ._builders import Builder
+from ._builders import Builder, free_name
 from ._effect import Effect, Quantity
 from ._response import RecordContext, Response, TrialContext, Values, Where
 from ._signatures import TIMES, follow, into, node
@@ -44,13 +44,6 @@ def _within(system: System, where: Where) -> str:
     return next((mass for lump, mass in ((a, b), (b, a)) if mass.startswith(f"{lump}_") and "_mass" in mass), "")
 
 
-def _name(system: System, wanted: str) -> str:
-    name, number = wanted, 2
-    while name in system.lumps:
-        name, number = f"{wanted}{number}", number + 1
-    return name
-
-
 def _places(system: System) -> Iterator[Where]:
     return ((link.name,) for link in system.links
             if _conducts(system, link) and not _present(system, (link.name,)))
@@ -62,7 +55,7 @@ def _add(system: System, where: Where, values: Values) -> System:
     if not _conducts(system, link):
         raise InputError(f"{link.name!r} is no path of conduction alone to an ambient", where="argument where",
                          remedy="Give natural convection, radiation, a step or what a column drives a link of its own.")
-    name, share = _name(system, f"{lump}_{ambient}_mass"), _share(values)
+    name, share = free_name(f"{lump}_{ambient}_mass", system.lumps), _share(values)
     own, outside = system.lumps[lump], system.ambients[ambient]
     capacity = max(values["capacity"], 1e-9)  # a lump of no capacity is no lump
     mass = (Lump(capacity=capacity) if own.initial is None else
