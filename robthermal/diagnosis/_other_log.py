@@ -5,6 +5,7 @@ Docs: Measured files.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -124,9 +125,21 @@ def asked_of_log(judged: Judged, refitted: Refitted, validation: Validation) -> 
     answer = _explained(records, refitted, judged, asked)
     if answer is None:
         return judged
+    asked = replace(asked, left=min(asked.left, _as_it_stands(nominal, answer)))
+    if not asked.clearly(answer) and not asked.as_well(answer):
+        return judged
     if not asked.clearly(answer) and _distinguished([*records, *_sampled(validation)], refitted, judged):
         return judged
     return _answered(judged, asked, answer)
+
+
+def _as_it_stands(nominal: Refit, answer: ReadAs) -> float:
+    """Mean square of the log as it stands with the same effects, fitted from where they are in the other reading [K²].
+
+    A fit that ended beside its best is no evidence for another reading.
+    """
+    again = next(with_some(nominal, answer.fit, len(answer.labels)), None) if answer.labels else None
+    return math.inf if again is None else square(again)
 
 
 def _on_part(judged: Judged, part: Sequence[Record], refitted: Refitted) -> _Compared:

@@ -50,7 +50,7 @@ from ._visible_words import visible_in_words
 from ._with_names import ranged
 from ._wrong_columns import asked_of_columns
 from .change import NAME, relative
-from .data import Measured, as_measured, noise_floor, refuse_constant, refuse_long
+from .data import Measured, as_measured, noise_floor, refuse_constant, refuse_long, with_recorded_units
 from .diagnosis import Diagnosis
 from .effects import candidates
 from .evidence import (
@@ -143,6 +143,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     """
     names = None if effects is None else tuple(effects)
     refuse_long(records, "records")
+    system = with_recorded_units(system, records)
     checked = Validation(validation, operating_point)
     _refuse_training_data(system, records, validation)
     again = partial(diagnose, parameters=parameters, effects=names, noise=noise, progress=progress)

@@ -10,6 +10,7 @@ from ._measured import as_measured as as_measured
 from ._measured import records_of as records_of
 from ._measured import refuse_long as refuse_long
 from ._measured import responses_of as responses_of
+from ._measured import with_recorded_units as with_recorded_units
 from ._measured import without_outliers as without_outliers
 from ._noise_estimate import SHORTEST as SHORTEST
 from ._noise_estimate import NoiseEstimate as NoiseEstimate
@@ -20,4 +21,4 @@ from ._warmest_room import warmest_rooms as warmest_rooms
 
 __all__ = ["SHORTEST", "Complex", "DataSet", "Measured", "NoiseEstimate", "RecordData", "ResponseData", "as_measured",
            "commands", "moves", "noise_floor", "records_of", "refuse_constant", "refuse_long", "responses_of",
-           "warmest_rooms", "without_outliers"]
+           "warmest_rooms", "with_recorded_units", "without_outliers"]

@@ -27,6 +27,27 @@ def as_measured(system: System, data: Measured | Sequence[Measured], where: str,
     return checked + [response_data(system, G, where, operating_point or {}) for G in responses]
 
 
+def with_recorded_units(system: System, data: Measured | Sequence[Measured]) -> System:
+    """The system with the units of recorded columns that heat nothing in it, where all records agree.
+
+    A heat in proportion to such a column makes it a heater, and the file with that effect has to say its unit.
+
+    Parameters
+    ----------
+    system : System
+        Nominal system to diagnose.
+    data : Record, FrequencyResponse, or list of them
+        Data of the fit, with the units of their columns.
+    """
+    records, _ = measured_of(data, "records")
+    inputs = dict(system.inputs)
+    for name, heater in system.inputs.items():
+        units = {one.units.get(name) for one in records}
+        if heater.gain == 0.0 and heater.unit is None and len(units) == 1 and (unit := units.pop()):
+            inputs[name] = heater.model_copy(update={"unit": unit})
+    return system.model_copy(update={"inputs": inputs})
+
+
 def refuse_long(data: Measured | Sequence[Measured], where: str) -> None:
     """Refuse records whose fits would take hours and fill the memory, and say how many samples to average.
 

@@ -147,9 +147,26 @@ def _exact(fit: Refit) -> Refit:
     structure = replace(fit.structure, coarse=())
     n = structure.n_common
     v = np.concatenate([fit.v[:n], fit.v[fit.structure.n_common:]])
-    start = fitted(structure, v, fit.floor, NoiseScaling(1.0, {})) if fit.structure.coarse else fit
+    start = _from_either(structure, v, fit.floor) if fit.structure.coarse else fit
     noise = {name: min(factor, 1.0) for name, factor in fit.levels.noise.items()}
     return replace(start, levels=replace(fit.levels, disturbance=min(fit.levels.disturbance, 1.0), noise=noise))
+
+
+def _from_either(structure: Structure, v: Array, floor: NoiseEstimate) -> Refit:
+    """Fit from v and, where that ends before it converges, from the declared parameters with the same effects.
+
+    What a finer network would change has taken some of the work of the parameters; without it their valley may be far.
+    """
+    fit = fitted(structure, v, floor, NoiseScaling(1.0, {}))
+    if fit.outcome.ok or not structure.n_parameters:
+        return fit
+    try:
+        other = fitted(structure, structure.start(structure.ranges.start, structure.quantities(v)), floor,
+                       NoiseScaling(1.0, {}))
+        power = float(np.sum(Whitened(structure, fit.whiteners).residual(other.v) ** 2))
+    except (Diverged, InputError):  # the declared parameters do not survive with these effects
+        return fit
+    return other if power < fit.rss else fit
 
 
 def only_heated(fit: Refit) -> Refit:
