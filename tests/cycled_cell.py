@@ -39,6 +39,14 @@ bus = { lump = "busbar", noise = 0.03 }
 "links.busbar-chamber.conductance" = { lower = 0.005, upper = 0.5 }
 """
 
+_SHARED = 'inputs.Heat = { lump = "roll", feedthrough = { lump = "busbar", share = 0.1 } }'
+WITH_HEATS = (SYSTEM.replace('{ lump = "busbar", gain = 0.0 }', '{ lump = "roll", gain = 0.04, unit = "A" }')
+              .replace('inputs.Heat = { lump = "roll" }', _SHARED)) + """
+"inputs.Current.gain" = { lower = 0.0, upper = 0.2 }
+"inputs.Heat.gain" = { lower = 0.5, upper = 2.0, sigma = 0.1 }
+"inputs.Heat.feedthrough.share" = { lower = 0.0, upper = 0.6 }
+"""
+
 
 def network() -> tuple[np.ndarray, np.ndarray]:
     """Rates by the temperatures of cells and busbar, and by plate, chamber, heat of the cell and of the busbar."""
@@ -72,8 +80,8 @@ def network() -> tuple[np.ndarray, np.ndarray]:
     return A / capacity[:, None], B / capacity[:, None]
 
 
-def write(path: Path, seed: int, n: int) -> Path:
-    """A log of pulses in both directions."""
+def write(path: Path, seed: int, n: int, older: float = 1.0) -> Path:
+    """A log of pulses in both directions; the resistance has grown by a factor that the logger does not know."""
     rng, t = np.random.default_rng(seed), H * np.arange(n)
     pulses = np.repeat(rng.choice([-60.0, -40.0, -25.0, 0.0, 0.0, 25.0, 40.0, 60.0], n // 40 + 1), 40)[:n]
     ampere = np.where(pulses == 0.0, 0.0, pulses + 3.0 * rng.standard_normal(n))
@@ -83,7 +91,7 @@ def write(path: Path, seed: int, n: int) -> Path:
     A, B = network()
     E = expm(np.block([[A * H, B * H], [np.zeros((4, len(A) + 4))]]))
     x, T = np.full(len(A), 24.0), np.empty((n, 3))
-    drives = np.column_stack([plate, chamber, heat + ENTROPY * ampere, BUSBAR * ampere**2])
+    drives = np.column_stack([plate, chamber, older * heat + ENTROPY * ampere, BUSBAR * ampere**2])
     middle = np.arange(RINGS * LAYERS).reshape(RINGS, LAYERS)[[0, -1], LAYERS // 2]
     for k in range(n):
         T[k] = x[[*middle, -1]]

@@ -43,6 +43,7 @@ _NOISE_ONLY = 1.5  # whitened variance
 _MOST = 0.95  # of what is outside the scatter, that changes must remove where they leave some of it
 _NAMING: tuple[Verdict, ...] = ("named", "named_with_remainder", "ambiguous")
 _COARSE = 5.0  # of the noise, that the model leaves of the reference records
+_FARTHER = 3.0  # times what the unchanged model leaves of any reference record: more than those show
 _CLOSED = 0.3  # of the excess rms of the validation records
 
 
@@ -66,6 +67,9 @@ class Compared:
         Where nothing has changed: the smallest relative decrease ("lower") and increase ("higher") of every parameter
         of the fit, and of the gain of every heater and module, that the new records would have shown with a chance of
         0.9 [-]; infinite where not even a large one.
+    unchanged : dict
+        Where nothing has changed: what the model of the reference records leaves of the "new" ones with its parameters
+        as they are, and at most of one of the "reference" records [K].
     convection : Convection or None
         Losses taken as natural convection, as the reference records ask for; None where conductances are constant.
     augmented : Augmented or None
@@ -86,6 +90,7 @@ class Compared:
     scatter: dict[str, float]
     deviation: dict[str, float]
     visible: dict[str, dict[str, float]] = field(default_factory=dict)
+    unchanged: dict[str, float] = field(default_factory=dict)
     convection: Convection | None = None
     augmented: Augmented | None = None
 
@@ -101,6 +106,18 @@ class Compared:
                 f"{noise:.2g} K. Until it is better, effects at the same lump may stand for each other, a heat into it "
                 f"for a weaker path out of it{first}.",)
 
+    @property
+    def beyond_reference(self) -> tuple[str, ...]:
+        """That new records within the scatter are farther from the model than any reference record, a sentence."""
+        new, most = self.unchanged.get("new", 0.0), self.unchanged.get("reference", math.inf)
+        if not new > _FARTHER * most:
+            return ()
+        return (f"The model of the reference records leaves {new:.2g} K of the new records and at most {most:.2g} K of "
+                "a reference record: numbers that differ by a few per cent from day to day would do that, and that "
+                f"they do is assumed beside no more than {self.records} reference "
+                f"record{'s' * (self.records > 1)}, which show less. More of them would tell whether something has "
+                "changed.",)
+
     def to_dict(self) -> dict[str, Any]:
         """What ``diagnosis.json`` holds under "reference"; null for a change that is not seen at all.
 
@@ -112,8 +129,10 @@ class Compared:
                    for name, sizes in self.visible.items()}
         model = {key: one.to_dict() for key, one in (("convection", self.convection), ("augmented", self.augmented))
                  if one is not None}
-        known = {key: value for key, value in vars(self).items() if key not in ("visible", "convection", "augmented")}
-        return {**known, **({"visible": visible} if visible else {}), **model}
+        known = {key: value for key, value in vars(self).items()
+                 if key not in ("visible", "unchanged", "convection", "augmented")}
+        where_seen = {"visible": visible} if visible else {}
+        return {**known, **where_seen, **({"unchanged": self.unchanged} if self.unchanged else {}), **model}
 
 
 def changed(system: System, records: Measured | Sequence[Measured], reference: Measured | Sequence[Measured], *,
@@ -171,7 +190,9 @@ def changed(system: System, records: Measured | Sequence[Measured], reference: M
         if judged.verdict != "consistent":
             return judged, said
         seen = visible_changes(new, healthy, found)
-        return judged, replace(said, visible={one.name: {"lower": one.lower, "higher": one.higher} for one in seen})
+        most = max(pinned(one).rms for one in healthy.each)
+        return judged, replace(said, visible={one.name: {"lower": one.lower, "higher": one.higher} for one in seen},
+                               unchanged={"new": judged.state.nominal.rms, "reference": most})
 
     answer = compared(warmest=False)
     if not too_warm(answer[0].state.fit):

@@ -292,7 +292,8 @@ def concluded(judged: Judged, trained: str = "training records") -> Diagnosis:
 
 def _with_reference(found: Diagnosis, compared: Compared) -> Diagnosis:
     """With what the reference records say: how large a change would have been seen, or how good the model is."""
-    said = visible_in_words(compared.visible) if found.verdict == "consistent" else compared.caveats
+    said = ((*compared.beyond_reference, *visible_in_words(compared.visible)) if found.verdict == "consistent" else
+            compared.caveats)
     law = compared.convection
     said = (*(str(one) for one in (compared.augmented, law) if one is not None), *said)
     answer = replace(found, reference=compared, caveats=(*found.caveats, *said),

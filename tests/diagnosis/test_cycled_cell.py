@@ -14,15 +14,16 @@ from robthermal.diagnosis import _searching as searching
 from robthermal.diagnosis import search
 from robthermal.diagnosis.fit import Structure, _refitting, coarsened, exact
 
-from ..cycled_cell import BUSBAR, ENTROPY, RESISTANCE, SYSTEM, write
+from ..cycled_cell import BUSBAR, ENTROPY, RESISTANCE, SYSTEM, WITH_HEATS, write
 
 CELL = rt.thermal.parse_system(SYSTEM)
+FITTED = rt.thermal.parse_system(WITH_HEATS)
 
 
 @cache
-def log(seed: int, n: int) -> rt.Record:
+def log(seed: int, n: int, older: float = 1.0) -> rt.Record:
     with TemporaryDirectory() as folder:
-        return rt.signals.read_record(write(Path(folder) / "log.csv", seed, n), CELL)
+        return rt.signals.read_record(write(Path(folder) / "log.csv", seed, n, older), CELL)
 
 
 @cache
@@ -75,3 +76,13 @@ def test_a_fit_that_ends_beside_its_best_is_no_sign_of_means(monkeypatch: pytest
     monkeypatch.setattr(_refitting, "_from_either", from_one_start)
     answer = rt.diagnose(CELL, log(1, 2400), validation=log(2, 720), effects=["driven_heat"])
     assert "means" not in answer.outcome.text
+
+
+@pytest.mark.parametrize(("older", "said"), [(1.0, False), (1.1, True)])
+def test_a_new_day_farther_from_the_model_than_any_reference_day_is_said(older: float, said: bool) -> None:
+    answer = rt.diagnose(FITTED, log(34, 600, older), reference=[log(seed, 600) for seed in (31, 32, 33)],
+                         effects=["sensor_lag"])
+    assert answer.verdict == "consistent" and answer.reference is not None
+    assert ("More of them would tell whether something has changed." in answer.outcome.text) == said
+    rms = answer.reference.unchanged
+    assert answer.reference.to_dict()["unchanged"] == rms and (rms["new"] > 3.0 * rms["reference"]) == said
