@@ -1,0 +1,50 @@
+"""A heater whose power changes more with temperature than the resistance of a metal does: more likely a loss."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ._found import Found
+
+_NAME = "heater_power_slope"
+_STEEPEST = 0.0065  # 1/K: iron; of pure metals, at room temperature
+_LOSSES = ("natural_convection", "radiation", "missing_ambient_link")
+
+
+def beyond_metals(effect: str, slope: float) -> bool:
+    """Whether an effect is a power that no wire of a pure metal makes, at a fixed voltage or current.
+
+    Parameters
+    ----------
+    effect : str
+        Name of the effect.
+    slope : float
+        Its first quantity, of a power the relative change per kelvin [1/K].
+    """
+    return effect == _NAME and abs(slope) > _STEEPEST
+
+
+def loses_heat(effect: str) -> bool:
+    """Whether an effect is a loss that a power which falls with temperature may stand for.
+
+    Parameters
+    ----------
+    effect : str
+        Name of the effect.
+    """
+    return effect in _LOSSES
+
+
+def steep_powers(effects: Sequence[Found]) -> list[str]:
+    """Named powers that change more with temperature than the resistance of any pure metal makes, a sentence each.
+
+    Parameters
+    ----------
+    effects : sequence of Found
+        Named effects with their sizes.
+    """
+    return [f"A power that {'falls' if slope < 0 else 'grows'} by {100.0 * abs(slope):.2g} % per kelvin is more than "
+            f"the resistance of a pure metal makes (0.39 % copper, {100.0 * _STEEPEST:.2g} % iron): unless "
+            f"{one.where[0]} is a PTC or NTC element or a transistor, {'a loss' if slope < 0 else 'a heat'} that grows "
+            "faster than those of the model is more likely."
+            for one in effects if one.effect == _NAME and beyond_metals(one.effect, slope := one.values["slope"][0])]
