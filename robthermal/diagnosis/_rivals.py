@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from ..errors import Diverged, InputError
@@ -16,6 +16,7 @@ from .search import (
     Entry,
     SearchState,
     heats_instead,
+    other_laws,
     other_thermometers,
     refit_short_list,
     resolve_places,
@@ -46,7 +47,7 @@ def with_rivals(state: SearchState, finer: Refit, validation: Validation) -> Sea
     """
     if finer.structure.n_coarse:
         listed = _with_other_thermometers(at_neighboring_lumps(state), finer, validation)
-        return _at_one_place(listed, finer, validation)
+        return _with_other_laws(_at_one_place(listed, finer, validation), finer, validation)
     rounds = []
     for place, round_ in enumerate(state.rounds):
         known = [entry for entry in round_.contenders if len(entry.fit.structure.effects) < len(state.rounds)
@@ -58,12 +59,23 @@ def with_rivals(state: SearchState, finer: Refit, validation: Validation) -> Sea
 
 def _with_other_thermometers(state: SearchState, finer: Refit, validation: Validation) -> SearchState:
     """List beside an offset of a thermometer others, and heats at its lump, that do nearly as much and predict."""
+    return _with_others(state, finer, validation, lambda round_, less: (
+        *other_thermometers(round_, state.fit, less), *heats_instead(round_, state.fit, less, state.names)))
+
+
+def _with_other_laws(state: SearchState, finer: Refit, validation: Validation) -> SearchState:
+    """List radiation beside natural convection, and the reverse, where it does nearly as much and predicts."""
+    return _with_others(state, finer, validation,
+                        lambda round_, less: other_laws(round_, state.fit, less, state.names))
+
+
+def _with_others(state: SearchState, finer: Refit, validation: Validation,
+                 asked: Callable[[Accepted, Refit], Iterable[Entry]]) -> SearchState:
+    """List beside every effect what is asked for of it and of the fit without it, where that predicts."""
     def others(place: int, round_: Accepted) -> list[Entry]:
         less = without(state.fit, place, finer, round_.before)
-        if less is None:
-            return []
-        instead = (*other_thermometers(round_, state.fit, less), *heats_instead(round_, state.fit, less, state.names))
-        return [entry for entry in instead if predicts(entry.fit, finer, validation)]
+        return [] if less is None else [entry for entry in asked(round_, less)
+                                        if predicts(entry.fit, finer, validation)]
 
     return replace(state, rounds=tuple(replace(round_, contenders=(*round_.contenders, *others(place, round_)))
                                        for place, round_ in enumerate(state.rounds)))

@@ -17,6 +17,7 @@ from ._neighbors import one_place as one_place
 from ._neighbors import with_neighbors as with_neighbors
 from ._other_end import with_other_end as with_other_end
 from ._other_thermometer import heats_instead as heats_instead
+from ._other_thermometer import other_laws as other_laws
 from ._other_thermometer import other_thermometers as other_thermometers
 from ._periods import between_trials as between_trials
 from ._periods import other_periods as other_periods
@@ -48,7 +49,7 @@ from ._wider_noise import with_wider_noise as with_wider_noise
 __all__ = ["ALIKE", "MASSES", "Accepted", "Decision", "EffectSet", "Entry", "JointCheck", "JointSelection",
            "SearchState", "ShortList", "accept", "begin", "beside", "between_trials", "checked_jointly", "compare",
            "decide", "exchange", "from_slow_thermometer", "heats_instead", "implausible_names", "leaves_large_misfit",
-           "needed", "one_place", "other_periods", "other_thermometers", "quantities_of", "reconsider",
+           "needed", "one_place", "other_laws", "other_periods", "other_thermometers", "quantities_of", "reconsider",
            "refit_candidates", "refit_set", "refit_short_list", "resolve_alternatives", "resolve_places", "revise",
            "revised", "ruled_out", "select_jointly", "shortlist", "validate", "with_neighbors", "with_other_end",
            "with_wider_noise", "without", "without_contradicted"]
