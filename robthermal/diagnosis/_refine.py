@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 from ..errors import Diverged, InputError
 from ..fitting import NONE, Choice, chosen_ranges
@@ -18,7 +19,8 @@ Fitted = Callable[[System, Choice], Refit]
 Again = Callable[[System, Choice], Diagnosis]
 _LUMPS = 2  # most lumps that are split
 _NEARLY = 0.5  # of the share of the first, that another lump must explain to be split too
-_RANGE = 100.0  # bounds of the conductance between the halves, times smaller or larger than its start
+_RANGE = 100.0  # bounds of the conductance between the parts, times smaller or larger than its start
+_SMALLEST = 0.02  # of the lower bound of the lump: the capacity of a part, such as a spot under a laser
 
 
 def refine(found: Diagnosis, system: System, parameters: Choice, fitted: Fitted, again: Again) -> Refinement | None:
@@ -44,7 +46,7 @@ def refine(found: Diagnosis, system: System, parameters: Choice, fitted: Fitted,
     ways = [(lump, moved) for lump in _worst(found.remainder, system) for moved in ways_to_split(system, lump)]
     tried = sorted(_fits(found.system, parameters, ways, fitted), key=lambda one: one[0].rms)
     for best, conductance in tried:
-        split = split_lump(system, best.lump, best.moved, conductance=conductance)
+        split = _split(system, best.lump, best.moved, conductance)
         try:
             return _refinement(found, again(split.system, _shared(system, parameters, split)), split, best,
                                tuple(one for one, _ in tried))
@@ -61,18 +63,41 @@ def _worst(rest: Remainder, system: System) -> list[str]:
 
 def _fits(system: System, parameters: Choice, ways: list[tuple[str, tuple[str, ...]]], fitted: Fitted
           ) -> Iterator[tuple[Split, float]]:
-    """Every way with the residual of its fit, and the conductance between the halves."""
+    """Every way with the residual of its fit, and the conductance between the parts."""
     for lump, moved in ways:
         try:
-            split = split_lump(system, lump, moved)
+            split = _split(system, lump, moved)
             fit = fitted(split.system, _shared(system, parameters, split))
         except (Diverged, InputError):  # tied parameters cannot be halved, or the fit runs away
             continue
         yield Split(lump, moved, fit.rms), fit.system.parameter(split.conductance)
 
 
+def _split(system: System, lump: str, moved: tuple[str, ...], conductance: float | None = None) -> SplitLump:
+    """The split system, in whose fit table the parts may have capacities of their own."""
+    split = split_lump(system, lump, moved, conductance=conductance)
+    own, other = _capacities(split)
+    one = system.fit.get(own)
+    if one is None or one.sigma is not None:  # what is known of the sum is not known of the parts
+        return split
+    part = _of_part(one)
+    return replace(split, system=split.system.model_copy(update={"fit": {**split.system.fit, own: part, other: part}}))
+
+
+def _capacities(split: SplitLump) -> tuple[str, str]:
+    own = f"lumps.{split.lump}.capacity"
+    return own, split.twins[own]
+
+
+def _of_part(whole: FitRange) -> FitRange:
+    return FitRange(lower=_SMALLEST * whole.lower, upper=whole.upper)
+
+
 def _shared(system: System, parameters: Choice, split: SplitLump) -> Choice:
-    """The parameters to refit: numbers that two halves share are tied, and the conductance between them is free."""
+    """The parameters to refit: capacities of the parts and the conductance between them are free, all else is tied.
+
+    Parts of a lump whose capacity has a prior are halves.
+    """
     ranges = chosen_ranges(system, parameters) if parameters is not None or system.fit else NONE
     out: dict[str | tuple[str, ...], FitRange] = {}
     for group, lower, upper, sigma in zip(ranges.members, ranges.lower, ranges.upper, ranges.sigma, strict=True):
@@ -80,6 +105,9 @@ def _shared(system: System, parameters: Choice, split: SplitLump) -> Choice:
         if half < 1.0 and len(group) > 1:
             raise InputError(f"{' = '.join(group)} are tied, and one of them is split", where="argument parameters",
                              remedy="Free them of each other.")
+        if group == _capacities(split)[:1] and not math.isfinite(sigma):
+            out |= dict.fromkeys(_capacities(split), _of_part(FitRange(lower=float(lower), upper=float(upper))))
+            continue
         names = (group[0], split.twins[group[0]]) if half < 1.0 else group
         out[names if len(names) > 1 else names[0]] = FitRange(
             lower=half * float(lower), upper=half * float(upper), sigma=half * float(sigma) if math.isfinite(sigma) else
@@ -92,12 +120,13 @@ def _refinement(found: Diagnosis, finer: Diagnosis, split: SplitLump, best: Spli
                 ) -> Refinement:
     before, after = ({kind: left(gap).rms for kind, gap in one.gap.items()} for one in (found, finer))
     helps = all(after[kind] ** 2 <= (1.0 - NEEDED) * before[kind] ** 2 for kind in before)
-    value, std = _conductance(finer.fit, split.conductance)
+    value, std = _conductance(finer, split.conductance)
     kinds = " and ".join(f"from {before[kind]:.2g} to {after[kind]:.2g} K on the "
                          f"{'training' if kind == 'train' else kind} records" for kind in before)
     names = ", ".join(one.label for one in finer.effects)
-    said = (f"{best} ({value:.3g} ± {std:.2g} W/K between them): the remainder goes {kinds}; the verdict is then "
-            f"{finer.verdict}" + (f", {names}" if names else "") + f". Best of {len(tried)} ways to split.")
+    own, other = map(finer.system.parameter, _capacities(split))
+    said = (f"{best} ({own:.3g} and {other:.3g} J/K, {value:.3g} ± {std:.2g} W/K between them): the remainder goes {kinds}; the verdict "
+            f"is then {finer.verdict}" + (f", {names}" if names else "") + f". Best of {len(tried)} ways to split.")
     code = DiagnosisCode.FINER if helps else DiagnosisCode.NOT_FINER
     if helps and finer.verdict == "consistent" and found.effects:
         said += f" Without any effect: {', '.join(one.label for one in found.effects)} may stand for the split only."
@@ -107,8 +136,9 @@ def _refinement(found: Diagnosis, finer: Diagnosis, split: SplitLump, best: Spli
                       outcome=code.outcome(said))
 
 
-def _conductance(fit: Refit, name: str) -> tuple[float, float]:
-    """Between the halves, with its standard deviation [W/K]; its coordinate is a logarithm."""
+def _conductance(found: Diagnosis, name: str) -> tuple[float, float]:
+    """Between the parts, with its standard deviation [W/K]; its coordinate is a logarithm."""
+    fit = found.fit if found.effects else found.nominal
     at = fit.structure.ranges.names.index(name)
     value = fit.system.parameter(name)
     return value, value * float(fit.covariance[at, at]) ** 0.5

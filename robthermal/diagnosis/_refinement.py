@@ -32,7 +32,7 @@ class Split:
 
     def __str__(self) -> str:
         away = " and ".join(name.partition(".")[2] for name in self.moved)
-        return f"{self.lump} in two halves" + (f", {away} at the other one" if away else "")
+        return f"{self.lump} in two parts" + (f", {away} at the other one" if away else "")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -46,7 +46,7 @@ class Refinement:
     tried : tuple of Split
         All ways that were tried, the best first.
     conductance : tuple of float
-        Between the halves, with its standard deviation [W/K].
+        Between the parts, with its standard deviation [W/K].
     before, after : mapping
         Remainder of the free runs beyond the noise on "train" and, if given, "validation" records [K].
     verdict : str
@@ -67,7 +67,7 @@ class Refinement:
     ...     best=best, tried=(best,), conductance=(1.2, 0.1), before={"train": 0.3}, after={"train": 0.0},
     ...     verdict="consistent", effects=(), system=split.system, outcome=rt.diagnosis.DiagnosisCode.FINER.outcome())
     >>> print(finer.best)
-    x3 in two halves, T3 at the other one
+    x3 in two parts, T3 at the other one
     """
 
     best: Split
@@ -89,7 +89,7 @@ class Refinement:
         return str(self.outcome)
 
     def _repr_html_(self) -> str:
-        rows = [("split", str(self.best)), ("between the halves", "{:.4g} ± {:.2g} W/K".format(*self.conductance)),
+        rows = [("split", str(self.best)), ("between the parts", "{:.4g} ± {:.2g} W/K".format(*self.conductance)),
                 ("verdict", self.verdict)]
         rows += [(f"remainder, {kind}", f"{self.before[kind]:.3g} K before, {self.after[kind]:.3g} K after")
                  for kind in self.before]

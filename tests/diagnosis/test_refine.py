@@ -33,22 +33,47 @@ OVEN = rt.System(
          "links.block-room.conductance": {"lower": 0.02, "upper": 2.0}})
 
 
-def measured(seed: int, *, between: float = 1.0, gusts: float = 0.0, n: int = 300) -> rt.Record:
-    """The block as two halves joined by a conductance: the heater is on one, sensor and plate are at the other."""
+def measured(seed: int, *, between: float = 1.0, gusts: float = 0.0, n: int = 300, spot: float = 0.0) -> rt.Record:
+    """The block as two halves joined by a conductance: the heater is on one, sensor and plate are at the other.
+
+    Or as a spot of so many J/K with heater and sensor, and the rest.
+    """
     rng = np.random.default_rng(seed)
     u = np.column_stack([np.repeat(rng.choice([0.0, 5.0, 10.0, 20.0], n // 20), 20),
                          np.repeat(rng.choice([0.0, 5.0, 10.0, 20.0], n // 25), 25)])
-    C = np.array([100.0, 100.0, 150.0])[:, None]
+    C = np.array([spot or 100.0, 200.0 - (spot or 100.0), 150.0])[:, None]
     A = np.array([[-between - 0.1, between, 0.0], [between, -between - 0.1 - 1.5, 1.5], [0.0, 1.5, -1.5 - 0.8]]) / C
     B = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]]) / C
     M = expm(np.block([[A, B], [np.zeros((2, 5))]]) * STEP)[:3]
     blown = gusts * (np.cumsum(rng.random(n) < 0.05) % 2)  # W into the plate, on and off
     T, out = np.zeros(3), []
     for k in range(n):
-        out.append(ROOM + T[1:])
+        out.append(ROOM + T[[0 if spot else 1, 2]])
         T = M @ np.array([*T, u[k, 0], u[k, 1] + blown[k]])
     return rt.Record(sample_time=STEP, inputs=u, outputs=np.array(out) + NOISE * rng.standard_normal((n, 2)),
                      input_names=["q", "p"], output_names=["T_block", "T_plate"])
+
+
+def test_a_spot_under_the_heater_is_found_with_a_capacity_of_its_own() -> None:
+    answer = rt.diagnose(OVEN, measured(1, between=0.4, spot=8.0), validation=measured(2, between=0.4, spot=8.0),
+                         effects=FEW, refine=True)
+    one = answer.refinement
+    assert one is not None and one.outcome.ok and one.lump == "block"
+    parts = sorted(one.system.parameter(f"lumps.{name}.capacity") for name in ("block", "block_2"))
+    assert parts == pytest.approx([8.0, 192.0], rel=0.1) and one.conductance[0] == pytest.approx(0.4, rel=0.05)
+    assert one.after["validation"] < 0.2 * one.before["validation"]
+    assert all(f"{value:.3g}" in one.outcome.text for value in parts)
+    for name in ("block", "block_2"):
+        bounds = one.system.fit[f"lumps.{name}.capacity"]
+        assert bounds.lower <= one.system.parameter(f"lumps.{name}.capacity") <= bounds.upper
+
+
+def test_parts_of_a_lump_whose_capacity_has_a_prior_are_halves() -> None:
+    prior = {**OVEN.fit, "lumps.block.capacity": {"lower": 50.0, "upper": 800.0, "sigma": 30.0}}
+    known = OVEN.model_copy(update={"fit": rt.System(**{**OVEN.model_dump(), "fit": prior}).fit})
+    one = rt.diagnose(known, measured(1), validation=measured(2), effects=FEW, refine=True).refinement
+    assert one is not None and one.outcome.ok
+    assert one.system.parameter("lumps.block.capacity") == one.system.parameter("lumps.block_2.capacity")
 
 
 @pytest.fixture(scope="module")
@@ -137,7 +162,7 @@ def test_a_name_that_stands_for_the_split_is_said_to_do_so() -> None:
 def test_the_folder_holds_the_split_network(halves: rt.diagnosis.Diagnosis, tmp_path: Path) -> None:
     out = tmp_path / "out"
     report = rt.jobs.write_diagnosis(Diagnosed(halves, (), (), ()), out)
-    assert "With block in two halves, q at the other one, the remainder falls from " in report.headline
+    assert "With block in two parts, q at the other one, the remainder falls from " in report.headline
     split = rt.read_system(out / "refined.toml")
     assert split.inputs["q"].lump == "block_2"
     assert split.parameter("links.block-block_2.conductance") == pytest.approx(1.0, rel=0.05)
