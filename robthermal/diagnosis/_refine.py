@@ -125,8 +125,9 @@ def _refinement(found: Diagnosis, finer: Diagnosis, split: SplitLump, best: Spli
                          f"{'training' if kind == 'train' else kind} records" for kind in before)
     names = ", ".join(one.label for one in finer.effects)
     own, other = map(finer.system.parameter, _capacities(split))
-    said = (f"{best} ({own:.3g} and {other:.3g} J/K, {value:.3g} ± {std:.2g} W/K between them): the remainder goes {kinds}; the verdict "
-            f"is then {finer.verdict}" + (f", {names}" if names else "") + f". Best of {len(tried)} ways to split.")
+    said = (f"{best} ({own:.3g} and {other:.3g} J/K, {value:.3g} ± {std:.2g} W/K between them): the remainder goes "
+            f"{kinds}; the verdict is then {finer.verdict}" + (f", {names}" if names else "")
+            + f". Best of {len(tried)} ways to split.")
     code = DiagnosisCode.FINER if helps else DiagnosisCode.NOT_FINER
     if helps and finer.verdict == "consistent" and found.effects:
         said += f" Without any effect: {', '.join(one.label for one in found.effects)} may stand for the split only."
