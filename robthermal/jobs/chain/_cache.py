@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
+import secrets
 import shutil
-import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -65,13 +65,9 @@ def staging(out: Path) -> Iterator[Path]:
         Results folder; made if it is not there, and removed again if nothing came into it.
     """
     made = not out.exists()
-    try:
-        (out / CACHE).mkdir(parents=True, exist_ok=True)
-        folder = Path(tempfile.mkdtemp(prefix="part-", dir=out / CACHE))
-    except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", where=str(out),
-                         remedy="Choose another folder with --out.") from None
-    try:
+    folder = out / CACHE / f"part-{secrets.token_hex(4)}"
+    try:  # before the folder is there: Ctrl-C may come as soon as it is
+        _make(folder, out)
         yield folder
     finally:  # also on Ctrl-C
         try:
@@ -81,10 +77,19 @@ def staging(out: Path) -> Iterator[Path]:
             raise
 
 
+def _make(folder: Path, out: Path) -> None:
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700)
+    except OSError as error:
+        raise InputError(f"cannot be written ({error.strerror})", where=str(out),
+                         remedy="Choose another folder with --out.") from None
+
+
 def _remove(folder: Path, out: Path, made: bool) -> None:
     """Remove the folder of a stage, and a results folder that was made for it and holds nothing."""
     shutil.rmtree(folder, ignore_errors=True)
-    if made and out.exists() and not any((out / CACHE).iterdir()):
+    if made and folder.parent.is_dir() and not any(folder.parent.iterdir()):
         shutil.rmtree(out, ignore_errors=True)
 
 
