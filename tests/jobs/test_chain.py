@@ -13,6 +13,7 @@ from commands import Run
 from heated_bar import NOISE, PROJECT, write_bar
 
 import robthermal as rt
+from robthermal.jobs.chain import _cache
 from robthermal.jobs.chain import _run as chain
 from robthermal.jobs.chain._cache import staging
 
@@ -340,3 +341,17 @@ def test_the_chain_says_what_the_job_says(tmp_path: Path) -> None:
     summaries = [json.loads((tmp_path / name / "summary.json").read_text()) for name in ("out", "job")]
     for key in ("residuals", "calibrate", "currents"):
         assert summaries[0][key] == summaries[1][key], key
+
+
+def test_ctrl_c_as_soon_as_the_folder_of_a_stage_is_there_leaves_nothing(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    make = _cache._make
+
+    def interrupted(folder: Path, out: Path) -> None:
+        make(folder, out)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(_cache, "_make", interrupted)
+    with pytest.raises(KeyboardInterrupt), _cache.staging(tmp_path / "out"):
+        pass
+    assert not (tmp_path / "out").exists()
