@@ -10,6 +10,7 @@ which is linear in z(0), u and q: only the small fixed-point problem q = heat(T)
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import factorial
@@ -29,6 +30,7 @@ TAIL = np.linalg.inv(chebyshev.chebvander(2 * NODES - 1, DEGREE))[-2:]
 _TERMS = 18  # of the series of a matrix of norm 1: 1/18! is below a rounding
 _FUNCTIONS = DEGREE + 2
 _SMALL = 20000  # entries of F, of all derivatives together: larger ones are not kept
+_POWERS = np.array([factorial(k) for k in range(DEGREE + 1)]) * _MONOMIALS.T  # (s/h)^k -> nodal values
 _FACTORIALS = np.array([factorial(k) for k in range(_TERMS + _FUNCTIONS)], float)
 
 
@@ -54,15 +56,30 @@ class Step:
 def step_matrices(parts: Augmented, h: float) -> Step:
     """Matrices of a step of length h [s].
 
-    Complex `parts` (complex-step derivatives) and leading axes of F, B and N (many derivatives at once) are allowed;
-    the matrices then have the same leading axes. The last few are kept, for several records of one system; they
-    cannot be written to.
+    The last few are kept, for several records of one system; they cannot be written to.
     """
     if parts.F.size > _SMALL:
         return _made(parts, h)
     arrays = (parts.F, parts.B, parts.N, parts.ports)
     return _kept(_Asked(b"".join(one.tobytes() for one in arrays), tuple((one.shape, one.dtype.str) for one in arrays),
                         h, parts))
+
+
+def step_slopes(parts: Augmented, along: Sequence[Augmented], h: float) -> Array:
+    """Derivatives of [K Ku M] of a step of length h [s] along changes of F, B and N, (columns, rows, changes)."""
+    (nz, nu), nq, P = parts.B.shape, parts.N.shape[1], len(along)
+    B, N = (np.stack([getattr(one, part) for one in along], axis=1) * h for part in ("B", "N"))
+    integrals, slopes = _of_ports(parts, h, np.stack([one.F for one in along], axis=1) * h)
+    rows = len(integrals)
+    out = np.empty((nz + nu + (DEGREE + 1) * nq, rows, P))
+    out[:nz] = slopes[:, 0].transpose(2, 0, 1)
+    by_inputs = slopes[:, 1] @ (parts.B * h) + (integrals[:, 1] @ B.reshape(nz, -1)).reshape(rows, P, nu)
+    out[nz:nz + nu] = by_inputs.transpose(2, 0, 1)
+    if nq:
+        heats, moved = _of_heats(integrals), _of_heats(slopes.reshape(rows, -1, P * nz)).reshape(rows, -1, P, nz)
+        by_heats = moved @ (parts.N * h) + (heats @ N.reshape(nz, -1)).reshape(rows, -1, P, nq)
+        out[nz + nu:] = by_heats.transpose(1, 3, 0, 2).reshape(-1, rows, P)
+    return out
 
 
 @dataclass(frozen=True)
@@ -84,34 +101,43 @@ def _kept(asked: _Asked) -> Step:
 
 
 def _made(parts: Augmented, h: float) -> Step:
-    many, nz, nq = parts.F.shape[:-2], parts.F.shape[-1], parts.N.shape[-1]
-    if not parts.ports.size and not nq:  # a linear network: its state at the end, by that at the start and held inputs
-        (K, integral), = np.moveaxis(node_integrals(parts.F * h, NODES[-1:], 2), (-4, -3), (0, 1))
-        return Step(K, integral @ (parts.B * h), np.zeros((*many, nz, 0)))
-    theta = node_integrals(parts.F * h)
-    n_rows = DEGREE * parts.ports.size
-    to_nodes, to_end = theta[..., parts.ports, :], theta[..., -1, :, :, :]
-
-    def stacked(function: int, by: Array) -> Array:
-        """Rows [ports at nodes 1..p, z at the end] of one of the functions times a matrix."""
-        nodes = (to_nodes[..., function, :, :] @ by[..., None, :, :]).reshape(*many, n_rows, by.shape[-1])
-        return np.concatenate([nodes, to_end[..., function, :, :] @ by], axis=-2)
-
-    powers = np.stack([factorial(k) * stacked(k + 1, parts.N * h) for k in range(DEGREE + 1)], axis=-2)  # of s/h
-    M = np.einsum("...rkq,kj->...rjq", powers, _MONOMIALS)
-    return Step(stacked(0, np.eye(nz)), stacked(1, parts.B * h), M.reshape(*M.shape[:-2], (DEGREE + 1) * nq))
+    nz, nq = parts.N.shape
+    integrals, _ = _of_ports(parts, h, np.zeros((nz, 0, nz)))
+    heats = _of_heats(integrals) @ (parts.N * h) if nq else np.zeros((len(integrals), 0))
+    return Step(np.ascontiguousarray(integrals[:, 0]), integrals[:, 1] @ (parts.B * h),
+                heats.reshape(len(integrals), (DEGREE + 1) * nq))
 
 
-def node_integrals(Z: Array, nodes: Array = NODES[1:], functions: int = _FUNCTIONS) -> Array:
+def _of_ports(parts: Augmented, h: float, along: Array) -> tuple[Array, Array]:
+    """Integrals with rows [ports at nodes 1..p, z at the end] (rows, functions, n), and their derivatives."""
+    if parts.ports.size or parts.N.shape[1]:
+        both = node_integrals(parts.F * h, along)
+    else:  # a linear network: its state at the end, by that at the start and held inputs
+        both = node_integrals(parts.F * h, along, NODES[-1:], 2)
+    at_nodes = DEGREE * parts.ports.size
+    integrals, slopes = (np.concatenate([np.take(of, parts.ports, axis=2).swapaxes(1, 2).reshape(
+        at_nodes, of.shape[1], *of.shape[3:]), of[-1].swapaxes(0, 1)]) for of in both)
+    return integrals, slopes
+
+
+def _of_heats(integrals: Array) -> Array:
+    """By the heat at every node (rows, p + 1, ...), of integrals of the powers of s / h."""
+    return np.asarray(_POWERS @ integrals[:, 1:], np.float64)
+
+
+def node_integrals(Z: Array, along: Array, nodes: Array = NODES[1:], functions: int = _FUNCTIONS
+                   ) -> tuple[Array, Array]:
     """θ_j(c) = Σ_m c^(m+j) / (m+j)! Z^m at nodes c: e^(cZ), and integrals over s of e^((c-s)Z) s^(j-1) / (j-1)!.
 
     A Taylor series at c / 2^s, then s doublings θ_j(2c) = θ_0 θ_j + Σ_(k=1..j) c^(j-k) / (j-k)! θ_k
-    (Al-Mohy and Higham 2011, section 3).
+    (Al-Mohy and Higham 2011, section 3); the derivatives by the rule of products in both (their 2009 paper, section 5).
 
     Parameters
     ----------
-    Z : ndarray, shape (..., n, n)
+    Z : ndarray, shape (n, n)
         Rate times step [-].
+    along : ndarray, shape (n, changes, n)
+        Changes of Z [-], the axis of changes between row and column.
     nodes : ndarray, shape (n_nodes,)
         Parts of the step c [-]; default the nodes 1 to p.
     functions : int
@@ -119,26 +145,44 @@ def node_integrals(Z: Array, nodes: Array = NODES[1:], functions: int = _FUNCTIO
 
     Returns
     -------
-    ndarray, shape (..., n_nodes, functions, n, n)
+    integrals : ndarray, shape (n_nodes, functions, n, n)
         By node and j.
+    slopes : ndarray, shape (n_nodes, functions, n, changes, n)
+        Derivatives along the changes.
     """
     size = float(np.abs(Z).sum(axis=-1).max(initial=0.0))
     doublings = max(0, int(np.ceil(np.log2(size)))) if size > 1.0 else 0
-    many, n = Z.shape[:-2], Z.shape[-1]
-    scaled, powers = Z / 2.0**doublings, [np.broadcast_to(np.eye(n), Z.shape)]
-    for _ in range(_TERMS - 1):
-        powers.append(powers[-1] @ scaled)
+    n, P, _ = along.shape
     m, j = np.arange(_TERMS), np.arange(functions)[:, None]
     c = nodes[:, None, None] / 2.0**doublings
     weights = nodes[:, None, None] ** m * c**j / _FACTORIALS[m + j]
-    theta = np.moveaxis(np.tensordot(weights, np.stack(powers), axes=1), (0, 1), (-4, -3))
+    theta, slopes = (np.tensordot(weights, powers, axes=1)
+                     for powers in _powers(Z / 2.0**doublings, along / 2.0**doublings))
+    flat, tall = (nodes.size, functions, -1), (nodes.size, 1, n * P, n)
     for _ in range(doublings):
         later = np.maximum(j - j.T, 0)
         mixing = np.where((j.T >= 1) & (j.T <= j), c**later / _FACTORIALS[later], 0.0)
-        mixed = mixing @ theta.reshape(*many, nodes.size, functions, n * n)
-        theta = theta[..., :1, :, :] @ theta + mixed.reshape(theta.shape)
+        first = theta[:, :1]
+        if P:
+            mixed = (mixing @ slopes.reshape(flat)).reshape(slopes.shape)
+            mixed += first @ slopes
+            mixed += (slopes[:, :1].reshape(tall) @ theta).reshape(slopes.shape)
+            slopes = mixed
+        theta = first @ theta + (mixing @ theta.reshape(flat)).reshape(theta.shape)
         c = 2.0 * c
-    return np.asarray(theta)
+    return theta, slopes.reshape(nodes.size, functions, n, P, n)
+
+
+def _powers(Z: Array, along: Array) -> tuple[Array, Array]:
+    """Z^m (m, n, n) and their derivatives (m, n, changes n)."""
+    n, P, _ = along.shape
+    powers, slopes, wide = np.empty((_TERMS, n, n)), np.zeros((_TERMS, n, P * n)), along.reshape(n, P * n)
+    powers[0] = np.eye(n)
+    for m in range(1, _TERMS):
+        np.matmul(powers[m - 1], Z, out=powers[m])
+        if P:
+            slopes[m] = (slopes[m - 1].reshape(n * P, n) @ Z).reshape(n, P * n) + powers[m - 1] @ wide
+    return powers, slopes
 
 
 def window_matrices(step: Step, ports: NDArray[np.intp], samples: int) -> Step:

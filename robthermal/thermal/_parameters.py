@@ -33,7 +33,8 @@ FIELDS: dict[str, tuple[str, ...]] = {
 }
 _WORDS = {field: tuple(field.split(".")) for fields in FIELDS.values() for field in fields}
 LISTED = ("links", "leads", "flows")  # tables that are lists of named parts
-_KEPT = 4096  # names whose places are remembered: a fit asks for the same ones thousands of times
+_KEPT = 4096  # names and parts that are remembered: a fit asks for the same ones thousands of times
+_of_parts: dict[tuple[int, str, str], tuple[Part, tuple[tuple[str, float], ...]]] = {}
 
 
 def parts_of(system: System, table: str) -> Mapping[str, Part]:
@@ -44,11 +45,22 @@ def parts_of(system: System, table: str) -> Mapping[str, Part]:
 
 def parameters(system: System) -> Iterator[tuple[str, float]]:
     """Every number that is set, with its name."""
-    for table, fields in FIELDS.items():
+    for table in FIELDS:
         for name, part in parts_of(system, table).items():
-            for field in fields:
-                if (value := _get(part, field)) is not None:
-                    yield f"{table}.{name}.{field}", value
+            yield from _numbers(table, name, part)
+
+
+def _numbers(table: str, name: str, part: Part) -> tuple[tuple[str, float], ...]:
+    """Numbers of one part; those of the last parts are kept, for systems that differ in a few of them."""
+    key = id(part), table, name
+    known = _of_parts.get(key)
+    if known is None:
+        numbers = tuple((f"{table}.{name}.{field}", value) for field in FIELDS[table]
+                        if (value := _get(part, field)) is not None)
+        if len(_of_parts) >= _KEPT:
+            _of_parts.clear()
+        _of_parts[key] = known = part, numbers  # a part that is kept keeps its identity
+    return known[1]
 
 
 EFFECT_SIZES = {  # zero or absent: the effect is not there
@@ -69,10 +81,15 @@ def present_effects(system: System) -> Iterator[str]:
 def locate(system: System, name: str) -> tuple[str, str, str]:
     """Split a parameter name into table, part and field; names may contain dots."""
     table, _, rest = name.partition(".")
-    if table in FIELDS:
-        found = _split(table, rest, tuple(parts_of(system, table)))
-        if found:
-            return table, *found
+    return _located(system, name, parts_of(system, table) if table in FIELDS else {})
+
+
+def _located(system: System, name: str, parts: Mapping[str, Part]) -> tuple[str, str, str]:
+    """As `locate`, with the parts of the table that the name begins with."""
+    table, _, rest = name.partition(".")
+    found = _split(table, rest, tuple(parts)) if table in FIELDS else None
+    if found:
+        return table, *found
     known = list(dict(parameters(system)))
     close = difflib.get_close_matches(name, known, n=1)
     remedy = f"Did you mean {close[0]!r}?" if close else f"For example {known[0]!r}."
@@ -109,13 +126,17 @@ def read_parameter(system: System, name: str) -> float:
 def replace_parameters(system: System, values: Mapping[str, float]) -> System:
     """Copy of the system with new values; each touched part is validated again."""
     changes: dict[str, dict[str, dict[str, float]]] = {}
+    there: dict[str, Mapping[str, Part]] = {}
     for name, value in values.items():
-        table, part, field = locate(system, name)
+        table = name.partition(".")[0]
+        if table in FIELDS and table not in there:
+            there[table] = parts_of(system, table)
+        table, part, field = _located(system, name, there.get(table, {}))
         changes.setdefault(table, {}).setdefault(part, {})[field] = float(value)
     update: dict[str, Any] = {}
     for table, parts in changes.items():
         new = {name: _changed(part, parts[name], f"{table}.{name}") if name in parts else part
-               for name, part in parts_of(system, table).items()}
+               for name, part in there[table].items()}
         update[table] = tuple(new.values()) if table in LISTED else new
     return system.model_copy(update=update)
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .._recursion import recursion
-from ._augmented import Augmented, slope, without_meters
-from ._collocation import DEGREE, Step, step_matrices
+from ._augmented import slope, without_meters
+from ._collocation import DEGREE, Step, step_slopes
 from ._exponential import Integrator, Path
 from ._parameter_heat import touched
 from ._schedule import Schedule
@@ -21,7 +21,6 @@ from ._terms import Array
 
 _CHUNK = 1024
 _ENTRIES = 60000  # of all matrices F that are differentiated at once: their step matrices have 35 times as many
-_IMAGINARY = 1e-40
 
 
 @dataclass(frozen=True)
@@ -70,13 +69,8 @@ class Sensitivity:
             size = max(1, _ENTRIES // self.n_free**2)
             every, done = list(self._linear.values()), []
             for first in range(0, len(every), size):
-                d = every[first:first + size]
-                moved = Augmented(parts.F + 1j * _IMAGINARY * np.stack([part.F for part in d]),
-                                  parts.B + 1j * _IMAGINARY * np.stack([part.B for part in d]),
-                                  parts.N + 1j * _IMAGINARY * np.stack([part.N for part in d]), parts.ports)
-                s = step_matrices(moved, h)
-                done.append(np.concatenate([s.K, s.Ku, s.M], axis=2).imag / _IMAGINARY)
-            by_linear = np.concatenate(done).T
+                done.append(step_slopes(parts, every[first:first + size], h))
+            by_linear = np.concatenate(done, axis=2)
             self._steps[kind, level] = np.zeros((*by_linear.shape[:2], len(self.names)))
             self._steps[kind, level][..., self._columns] = by_linear
         return self._steps[kind, level]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,9 @@ _LEAST_PARAMETER, _LEAST_QUANTITY = 1e-3, 1e-6  # sizes a step is taken of at le
 _UNLIKE = 0.01  # of a change: more than the curvature of a step makes
 
 
-def derives(numbers: Numbers, v: Array, values: dict[str, float], columns: list[dict[str, float]], upper: Array
-            ) -> bool:
-    """Whether an effect derives a number from a nominal parameter: all moved at once, does any other number move?
+def unexplained(numbers: Numbers, v: Array, values: dict[str, float], columns: list[dict[str, float]], upper: Array,
+                some: Sequence[int]) -> set[str]:
+    """Numbers that an effect derives from some nominal parameters: all moved at once, they move as no column says.
 
     Parameters
     ----------
@@ -30,16 +30,34 @@ def derives(numbers: Numbers, v: Array, values: dict[str, float], columns: list[
         Derivatives of the numbers that each parameter is known to move.
     upper : ndarray
         Upper bounds of the parameters, at which numbers stand still.
+    some : sequence of int
+        Places of the parameters that are moved.
     """
-    p = len(columns)
-    steps = np.array([_step(v[i], upper[i], _LEAST_PARAMETER) for i in range(p)])
-    moved = numbers(np.concatenate([v[:p] + steps, v[p:]]))
-    known = dict.fromkeys(values, 0.0)
-    for step, column in zip(steps, columns, strict=True):
-        for name, slope in column.items():
-            known[name] += float(step) * slope
+    at, known = v.copy(), dict.fromkeys(values, 0.0)
+    for i in some:
+        step = _step(v[i], upper[i], _LEAST_PARAMETER)
+        at[i] += step
+        for name, slope in columns[i].items():
+            known[name] += step * slope
+    moved = numbers(at)
     changes = {name: moved[name] - value for name, value in values.items()}
-    return any(abs(change - known[name]) > _UNLIKE * abs(change) for name, change in changes.items())
+    return {name for name, change in changes.items() if abs(change - known[name]) > _UNLIKE * abs(change)}
+
+
+def _deriving(numbers: Numbers, v: Array, values: dict[str, float], columns: list[dict[str, float]], upper: Array,
+              some: Sequence[int]) -> list[int]:
+    """Which of some nominal parameters an effect derives numbers from; few do, and most of them a number of their own.
+
+    Those that have none among the unexplained numbers are asked for again together, and then by halves.
+    """
+    names = unexplained(numbers, v, values, columns, upper, some) if some else set()
+    if not names or len(some) == 1:
+        return list(some) if names else []
+    own = [i for i in some if names & columns[i].keys()]
+    rest = [i for i in some if i not in own]
+    half = 0 if own else len(rest) // 2
+    return [*own, *(i for part in (rest[:half], rest[half:])
+                    for i in _deriving(numbers, v, values, columns, upper, part))]
 
 
 def moved_by(numbers: Numbers, v: Array, i: int, values: dict[str, float], own: dict[str, float], upper: float
@@ -100,7 +118,6 @@ def with_quantities(numbers: Numbers, v: Array, columns: list[dict[str, float]],
     p, out, values = len(columns), list(columns), numbers(v)
     for i in range(p, len(upper)):
         out.append(_slopes(numbers, v, i, values, _step(v[i], upper[i], _LEAST_QUANTITY)))
-    if derives(numbers, v, values, columns, upper):
-        for i in range(p):  # what an effect derives from a nominal parameter moves with it
-            out[i] = moved_by(numbers, v, i, values, columns[i], upper[i])
+    for i in _deriving(numbers, v, values, columns, upper, range(p)):
+        out[i] = moved_by(numbers, v, i, values, columns[i], upper[i])
     return out
