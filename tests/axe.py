@@ -13,7 +13,8 @@ needs_chromium = pytest.mark.skipif(CHROMIUM is None,
                                     reason="no Chromium on this machine (Debian: apt install chromium)")
 needs_axe = pytest.mark.skipif(CHROMIUM is None or not AXE.is_file(),
                                reason="no Chromium, or no axe-core in build/axe (.ci/run fetches it with npm)")
-_RULES = "axe.run(document).then(found => JSON.stringify(found.violations.map(one => [one.id, one.nodes[0].html])))"
+_RULES = ("axe.run(document, {resultTypes: ['violations']})"
+          ".then(found => JSON.stringify(found.violations.map(one => [one.id, one.nodes[0].html])))")
 
 
 def violations(page: Page) -> list[list[str]]:

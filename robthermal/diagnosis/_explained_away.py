@@ -54,6 +54,19 @@ def predicting_alone(state: SearchState, finer: Refit, validation: Validation) -
         for round_ in listed.rounds)))
 
 
+def closing(state: SearchState, validation: Validation) -> bool:
+    """Whether all effects found with the network as it is close the gap of training and validation records together.
+
+    Parameters
+    ----------
+    state : SearchState
+        Search with the network taken to be right.
+    validation : Validation
+        Data that no fit has seen.
+    """
+    return bool(state.rounds) and validation.data is not None and _closes(state.fit, state.nominal, validation, _CLOSED)
+
+
 def leaves_far_more(finer: Refit, fit: Refit) -> bool:
     """Whether a finer network without effects leaves a misfit, and far more of the training records than a fit does.
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..errors import Diverged, InputError
-from ._explained_away import predicting_alone, saying_so
+from ._explained_away import closing, predicting_alone, saying_so
 from ._judge import Judged, Progress, Validation, Verdict, independent_of_step, judge, no_names
 from ._lasting import evidence_of, lasting
 from ._outcomes import DiagnosisCode
@@ -61,7 +61,7 @@ def graded(judged: Judged, validation: Validation, progress: Progress) -> Judged
     state = judged.state
     if judged.verdict != "unexplained" or not state.nominal.records:
         return judged
-    judged = replace(judged, why="more than noise is left beside it")
+    judged = replace(judged, why="more than noise is left beside it", validation=validation)
     try:
         finer = coarsened(state.nominal)
         if finer.structure.n_coarse:
@@ -76,18 +76,30 @@ def graded(judged: Judged, validation: Validation, progress: Progress) -> Judged
         elif len(state.rounds) > 1 and finer.structure.n_coarse:  # each was chosen before the others were known
             state = lasting(revise(replace(state, misfit_left=False)), finer, validation)
         if not state.rounds:
-            alone = predicting_alone(judged.state, finer, validation) if finer.structure.n_coarse else None
-            if alone is not None:
-                return saying_so(_graded(judged, alone, judged.state.nominal, validation), finer)
-            return _nothing_lasts(judged, finer)
+            return _alone(judged, finer, validation) or _nothing_lasts(judged, finer)
         state = _predicting(replace(state, misfit_left=False), finer, validation, progress)
         kept = validated(state, validation, progress)
         if len(kept.rounds) < len(state.rounds):  # what is left has been tested beside what is gone
             kept = lasting(kept, finer, validation)
         state = _predicting(kept, finer, validation, progress)
-        return _graded(judged, with_rivals(state, finer, validation), finer, validation)
+        answer = _graded(judged, with_rivals(state, finer, validation), finer, validation)
+        return answer if answer.verdict != "unexplained" else _alone(judged, finer, validation, answer) or answer
     except (Diverged, InputError):  # a model that runs away is no explanation
         return judged
+
+
+def _alone(judged: Judged, finer: Refit, validation: Validation, instead: Judged | None = None) -> Judged | None:
+    """The answer with the effects found with the network as it is, where they alone predict; else None.
+
+    Instead of effects that last beside a finer network and are no answer, only with a name.
+    """
+    if not finer.structure.n_coarse or (instead is not None and not closing(judged.state, validation)):
+        return None
+    alone = predicting_alone(judged.state, finer, validation)
+    if alone is None:
+        return None
+    answer = saying_so(_graded(judged, alone, judged.state.nominal, validation), finer)
+    return None if instead is not None and answer.verdict == "unexplained" else answer
 
 
 def chosen_again(state: SearchState, nominal: Refit) -> SearchState:

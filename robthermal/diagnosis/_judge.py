@@ -72,6 +72,8 @@ class Judged:
         For every effect, where the model is not exact.
     why : str
         Of an answer "unexplained" that was graded: what kept effects from being named, in words that follow "because".
+    validation : Validation, optional
+        Of such an answer: data that no fit has seen, by which effects were judged.
     alone : str
         Of such an answer: which effect alone predicts the validation records best, in a sentence; empty if none does.
     compared : bool
@@ -90,6 +92,7 @@ class Judged:
     plain: Refit | None = None
     evidence: tuple[Evidence, ...] = ()
     why: str = ""
+    validation: Validation | None = None
     alone: str = ""
     compared: bool = False
     means: str = ""

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 from ..errors import Diverged, InputError
-from ._judge import Validation
-from .evidence import NEEDED, SURE, Evidence, Stability, expected_rms, left, reproducible, stability
+from ._judge import Validation, of_its_time
+from .evidence import NEEDED, PREDICTED, SURE, Evidence, Stability, expected_rms, left, reproducible, stability
 from .fit import Refit, coarsened, exact
 from .search import Accepted, Entry, SearchState, without
 
@@ -28,9 +29,11 @@ def evidence_of(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, validati
     if not rounds:
         return ()
     whole, bare = exact(fit), exact(nominal)
-    return tuple(Evidence(share=share, reproducible=_reproducible(rounds, fit, nominal, place),
-                          stability=_stability(fit, place), needed=_needed(whole, bare, place, validation))
-                 for place, share in enumerate(_shares(whole, bare)))
+    found = (Evidence(share=share, reproducible=_reproducible(rounds, fit, nominal, place),
+                      stability=_stability(fit, place), needed=_needed(whole, bare, place, validation))
+             for place, share in enumerate(_shares(whole, bare)))
+    return tuple(one if one.lasting or one.needed < NEEDED else
+                 replace(one, predicted=_predicted(fit, nominal, place, validation)) for place, one in enumerate(found))
 
 
 def lasts(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, place: int, validation: Validation | None = None
@@ -44,7 +47,8 @@ def lasts(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, place: int, va
     place : int
         Of the effect.
     """
-    return _needed(exact(fit), exact(nominal), place, validation) >= NEEDED and _holds(rounds, fit, nominal, place)
+    needed = _needed(exact(fit), exact(nominal), place, validation) >= NEEDED
+    return needed and _holds(rounds, fit, nominal, place, validation)
 
 
 def _weakest(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, validation: Validation | None) -> int | None:
@@ -55,13 +59,31 @@ def _weakest(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, validation:
     needs = [_needed(exact(fit), exact(nominal), place, validation) for place in range(len(rounds))]
     if any(not need >= NEEDED for need in needs):
         return needs.index(min(needs))
-    fleeting = [place for place in range(len(rounds)) if not _holds(rounds, fit, nominal, place)]
+    fleeting = [place for place in range(len(rounds)) if not _holds(rounds, fit, nominal, place, validation)]
     return min(fleeting, key=needs.__getitem__, default=None)
 
 
-def _holds(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, place: int) -> bool:
-    """Whether an effect keeps its size over segments and is better than none in block after block."""
-    return _stability(fit, place).constant and _reproducible(rounds, fit, nominal, place) >= SURE
+def _holds(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, place: int, validation: Validation | None) -> bool:
+    """Whether an effect keeps its size over segments and is better than none in block after block, or predicts.
+
+    Training records that hardly excite an effect say little of its size part by part. Where that size takes nearly all
+    of what is left without it off records that no fit has seen, they have confirmed it.
+    """
+    if _stability(fit, place).constant and _reproducible(rounds, fit, nominal, place) >= SURE:
+        return True
+    return _predicted(fit, nominal, place, validation) >= PREDICTED
+
+
+def _predicted(fit: Refit, nominal: Refit, place: int, validation: Validation | None) -> float:
+    """Part of the excess mean square of validation records left without an effect that it removes.
+
+    0 for a swing or a step at a time of the training records: on another day it fits by accident.
+    """
+    whole, bare = exact(fit), exact(nominal)
+    if validation is None or of_its_time(fit.structure.effects[place]):
+        return 0.0
+    plain = bare if len(whole.structure.effects) == 1 else without(whole, place, bare)
+    return 0.0 if plain is None else _needed_held_out(whole, plain, validation)
 
 
 def _reproducible(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, place: int) -> float:
@@ -71,8 +93,16 @@ def _reproducible(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, place:
 
 
 def _needed(whole: Refit, bare: Refit, place: int, validation: Validation | None) -> float:
-    """Part of the excess mean square left without an effect that it removes, of training or validation records."""
-    plain = bare if len(whole.structure.effects) == 1 else without(whole, place, bare)
+    """Part of the excess mean square left without an effect that it removes, of training or validation records.
+
+    A swing or a step at a time of the training records may fit there what others leave: beside these it is needed only
+    if it is on validation records, where there are any, by the part of their rms that a whole set has to remove.
+    """
+    alone = len(whole.structure.effects) == 1
+    plain = bare if alone else without(whole, place, bare)
+    trained = not alone and of_its_time(whole.structure.effects[place])
+    if trained and plain is not None and validation is not None and validation.data is not None:
+        return 1.0 - math.sqrt(max(1.0 - _needed_held_out(whole, plain, validation), 0.0))
     before, after = _excess(whole if plain is None else plain, whole), _excess(whole, whole)
     needed = 1.0 - after / before if before > 0 else 0.0
     if needed < NEEDED and plain is not None and validation is not None:

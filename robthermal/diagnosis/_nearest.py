@@ -57,7 +57,7 @@ def _why(judged: Judged) -> str:
     if judged.compared:
         return judged.why
     state = judged.state
-    found = evidence_of(state.rounds, state.fit, state.nominal)
+    found = evidence_of(state.rounds, state.fit, state.nominal, judged.validation)
     labels = [round_.best.candidate.label for round_ in state.rounds]
     short = [f"{label} {one.short_of}" for label, one in zip(labels, found, strict=True) if not one.lasting]
     holding = [label for label, one in zip(labels, found, strict=True) if one.lasting]

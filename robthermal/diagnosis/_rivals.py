@@ -54,7 +54,8 @@ def with_rivals(state: SearchState, finer: Refit, validation: Validation) -> Sea
                  or predicts(entry.fit, finer, validation)]
         rivals = (entry for entry in _rivals(state, place, finer) if predicts(entry.fit, finer, validation))
         rounds.append(replace(round_, contenders=(*known, *rivals)))
-    return _with_other_thermometers(replace(state, rounds=tuple(rounds)), finer, validation)
+    listed = _with_other_thermometers(replace(state, rounds=tuple(rounds)), finer, validation)
+    return _with_other_laws(listed, finer, validation)
 
 
 def _with_other_thermometers(state: SearchState, finer: Refit, validation: Validation) -> SearchState:

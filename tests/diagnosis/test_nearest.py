@@ -113,7 +113,10 @@ def test_the_first_sentence_of_the_report_says_it_in_words(unexplained: Diagnosi
     (Evidence(0.9, 0.62, Stability(6, 0.1), 0.9), "in 62 % of draws of parts of the records, less than 95 %"),
     (Evidence(0.9, 1.0, Stability(1, 0.0), 0.9), "in a single part of the records"),
     (Evidence(0.9, 1.0, Stability(6, 0.8), 0.9), "differs by 80 % between parts of the records, more than 50 %"),
-    (Evidence(0.9, 1.0, Stability(6, float("nan")), 0.9), "differs by nan %")])
+    (Evidence(0.9, 1.0, Stability(6, float("nan")), 0.9), "differs by nan %"),
+    (Evidence(0.9, 0.62, Stability(6, 0.8), 0.9, predicted=0.9), ""),
+    (Evidence(0.9, 0.62, Stability(6, 0.1), 0.9, predicted=0.89), "in 62 % of draws"),
+    (Evidence(0.9, 1.0, Stability(6, 0.1), 0.12, predicted=0.99), "takes 12 % off")])
 def test_every_test_of_an_effect_has_its_words(found: Evidence, words: str) -> None:
     assert (words in found.short_of) and found.lasting is (found.short_of == "") and found.lasting is (words == "")
 
@@ -132,7 +135,7 @@ def test_every_effect_has_a_reason(unexplained: Diagnosis, monkeypatch: pytest.M
     monkeypatch.setattr("robthermal.diagnosis._nearest.evidence_of", lambda *fits: [
         Evidence(0.9, 1.0, Stability(6, 0.1), 0.9 if one else 0.12) for one in lasting])
     state = SimpleNamespace(rounds=(round_("a"), round_("b")), fit=None, nominal=None)
-    judged = SimpleNamespace(why=why, alone="", compared=False, state=state)
+    judged = SimpleNamespace(why=why, alone="", compared=False, state=state, validation=None)
     said = nearest(judged, unexplained.gap)  # type: ignore[arg-type]
     rest = " what is left without it, less than the 30 % of an effect that is needed"
     assert said.partition("No name, because ")[2] == words.format(*[rest] * words.count("{}"))

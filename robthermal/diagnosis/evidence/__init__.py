@@ -3,6 +3,7 @@
 from ._adequacy import Adequacy as Adequacy
 from ._adequacy import adequacy as adequacy
 from ._blocks import NEEDED as NEEDED
+from ._blocks import PREDICTED as PREDICTED
 from ._blocks import SURE as SURE
 from ._blocks import Evidence as Evidence
 from ._blocks import Stability as Stability
@@ -40,8 +41,8 @@ from ._unknown_heat import UnknownHeat as UnknownHeat
 from ._unknown_heat import unknown_heat as unknown_heat
 
 __all__ = ["ALIAS", "ALPHA", "Adequacy", "BIC_GAP", "Evidence", "Gap", "HoldOut", "Left", "Location", "NEEDED",
-           "Remainder", "SURE", "Scores", "Stability", "Twin", "UnknownHeat", "ValidationResiduals", "Wandering",
-           "adequacy", "deviations", "expected_rms", "explains", "hold_out", "left", "locate",
+           "PREDICTED", "Remainder", "SURE", "Scores", "Stability", "Twin", "UnknownHeat", "ValidationResiduals",
+           "Wandering", "adequacy", "deviations", "expected_rms", "explains", "hold_out", "left", "locate",
            "negative_log_predictive_density", "promised", "promising", "refuse_seen", "remainder", "reproducible",
            "score", "score_candidates", "square_beyond_noise", "stability", "unknown_heat", "validation_data",
            "wandering"]

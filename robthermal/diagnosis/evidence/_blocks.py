@@ -20,6 +20,7 @@ SURE = 0.95  # share of the draws
 SEGMENTS = 6  # of all records together, at least
 WIDEST = 0.5  # spread of a size over segments, relative: beyond, it is no constant
 NEEDED = 0.3  # of what is left without it, that an effect must explain
+PREDICTED = 0.9  # of what is left without it of records that no fit has seen: a size that does so is the right one
 _DRAWS = 2000
 _SEED = 20  # of the bootstrap: an answer does not change when it is asked again
 
@@ -78,16 +79,19 @@ class Evidence:
         Spread of its size over segments.
     needed : float
         Part of the excess mean square left without it that it removes [-].
+    predicted : float
+        The same of the validation records alone, asked where it does not hold over parts of the training records [-].
     """
 
     share: float
     reproducible: float
     stability: Stability
     needed: float
+    predicted: float = 0.0
 
     @property
     def lasting(self) -> bool:
-        """Whether it holds over blocks and segments and is needed."""
+        """Whether it is needed, and holds over blocks and segments or predicts data that no fit has seen."""
         return not self.short_of
 
     @property
@@ -96,6 +100,8 @@ class Evidence:
         if not self.needed >= NEEDED:
             return (f"takes {_below(self.needed, NEEDED)} off what is left without it, less than the "
                     f"{100.0 * NEEDED:.0f} % of an effect that is needed")
+        if self.predicted >= PREDICTED:
+            return ""
         if not self.reproducible >= SURE:
             return (f"lessens the error in {_below(self.reproducible, SURE)} of draws of parts of the records, less "
                     f"than {100.0 * SURE:.0f} %")
