@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from ..thermal import System, parameter_in_words
 from ._found import Found
 from ._judge import Name, Verdict
 from .effects import AMBIENT_DRIFT, Candidate
+from .evidence import PREDICTED
 from .fit import FoundAmbient, Refit, found_ambients
 from .search import MASSES, Accepted, other_periods
 
@@ -170,6 +171,19 @@ def within_the_body(system: System, effects: Sequence[Name]) -> list[str]:
     at = " or ".join(dict.fromkeys(filter(None, lumps)))
     return [f"A lag at {at} may also be the time that heat takes within {at}, from where it enters to the "
             f"thermometer: see whether a network with {at} split in two does as well."] if at else []
+
+
+def confirmed(effects: Iterable[Found]) -> list[str]:
+    """Effects that are named because they predict another day, though they do not hold over parts of the training one.
+
+    Parameters
+    ----------
+    effects : iterable of Found
+        Named effects, with their evidence.
+    """
+    return [f"{one.label} does not hold over parts of the training records; it is named because it takes "
+            f"{100.0 * one.evidence.predicted:.0f} % off what the validation records have without it."
+            for one in effects if one.evidence is not None and one.evidence.predicted >= PREDICTED]
 
 
 def which_is_off(system: System, effects: Sequence[Name]) -> list[str]:

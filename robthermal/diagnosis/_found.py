@@ -70,7 +70,8 @@ class Found:
         """
         one = self.evidence
         graded = {} if one is None else {"share": one.share, "reproducible": one.reproducible,
-                                         "stability": vars(one.stability)}
+                                         "stability": vars(one.stability),
+                                         **({"predicted": one.predicted} if one.predicted else {})}
         return {"effect": self.effect, "where": list(self.where), "p_value": self.p_value, "delta_bic": self.delta_bic,
                 **graded, **({"augmented": self.augmented} if self.augmented else {}),
                 **({"either": self.either} if self.either else {}),

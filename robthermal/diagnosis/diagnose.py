@@ -17,6 +17,7 @@ from ._changed import Compared, changed
 from ._doubts import (
     ambients_in_words,
     at_bounds,
+    confirmed,
     doubts,
     far_ambients,
     held_ambients,
@@ -315,7 +316,7 @@ def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
     """What to hold against the answer."""
     state, nominal, verdict = judged.state, judged.state.nominal, judged.verdict
     said = [one for one in (judged.means, judged.finer) if one]
-    said += nothing_fitted(nominal, verdict)
+    said += [*nothing_fitted(nominal, verdict), *confirmed(found.effects)]
     if verdict == "named_with_remainder":
         said += place_undecided([one.key for one in found.effects], found.alternatives)
     if verdict in ("named", "named_with_remainder", "ambiguous"):

@@ -8,8 +8,11 @@ import pytest
 
 import robthermal as rt
 from robthermal.diagnosis import _graded as graded
+from robthermal.diagnosis._doubts import confirmed
+from robthermal.diagnosis._found import Found
 from robthermal.diagnosis._judge import Judged, Validation
 from robthermal.diagnosis._lasting import evidence_of
+from robthermal.diagnosis.evidence import Evidence, Stability
 from robthermal.diagnosis.fit import Refit
 from robthermal.diagnosis.search import SearchState, accept, begin, refit_candidates
 
@@ -51,6 +54,17 @@ def test_an_effect_that_training_hardly_shows_is_confirmed_by_what_it_predicts(
     hot = Validation(of_bed(measured(13, *program(13, 900, [60.0, 80.0, 100.0]))))
     confirmed, = evidence_of(state.rounds, state.fit, nominal, hot)
     assert confirmed.lasting and confirmed.predicted > 0.99 and confirmed.stability == alone.stability
+
+
+def test_an_effect_that_another_day_confirms_says_so() -> None:
+    def named(predicted: float) -> Found:
+        evidence = Evidence(share=0.3, reproducible=0.9, stability=Stability(4, 0.57), needed=0.98, predicted=predicted)
+        return Found("natural_convection", ("plate", "room"), {"gain": (0.2, 0.1, "W/K^1.25")}, 1e-9, 500.0, evidence)
+
+    assert confirmed([named(0.0)]) == [] and "predicted" not in named(0.0).to_dict()
+    sentence, = confirmed([named(0.984), named(0.0)])
+    assert sentence.startswith("natural_convection(plate, room) does not hold over parts") and "98 % off" in sentence
+    assert named(0.984).to_dict()["predicted"] == 0.984
 
 
 def test_a_day_that_shows_it_no_better_confirms_nothing(hardly_excited: tuple[SearchState, Refit]) -> None:
