@@ -130,7 +130,7 @@ def node_integrals(Z: Array, along: Array, nodes: Array = NODES[1:], functions: 
     """θ_j(c) = Σ_m c^(m+j) / (m+j)! Z^m at nodes c: e^(cZ), and integrals over s of e^((c-s)Z) s^(j-1) / (j-1)!.
 
     A Taylor series at c / 2^s, then s doublings θ_j(2c) = θ_0 θ_j + Σ_(k=1..j) c^(j-k) / (j-k)! θ_k
-    (Al-Mohy and Higham 2011, section 3); the derivatives by the rule of products in both (their 2009 paper, section 5).
+    (Al-Mohy and Higham 2011, section 3); their derivatives by the rule of products in both (Al-Mohy and Higham 2009).
 
     Parameters
     ----------
