@@ -53,7 +53,7 @@ def day(seed: int, swing: float) -> rt.Record:
 
 @pytest.fixture(scope="module")
 def unexplained() -> Diagnosis:
-    return rt.diagnose(PLATE, day(1, 0.05), validation=day(2, 0.05), effects=NAMES)
+    return rt.diagnose(PLATE, day(1, 0.06), validation=day(3, 0.06), effects=NAMES)
 
 
 def test_a_steady_supply_leaves_radiation_alone() -> None:
@@ -65,6 +65,16 @@ def test_a_steady_supply_leaves_radiation_alone() -> None:
     (area,) = [text.partition("at least ")[2] for text in found.caveats if text.startswith("Radiation of this size")]
     assert float(area.partition(" cm²")[0]) == pytest.approx(1e4 * 1e-9 / 5.67e-8, rel=0.05)
     assert area.endswith("if plate has less, another loss hides in it.") and area in found.outcome.text
+
+
+def test_beside_a_swing_that_another_day_does_not_have_radiation_is_named() -> None:
+    """The swing, of another phase there, is not needed on it and is dropped: what it had hidden is chosen again."""
+    found = rt.diagnose(PLATE, day(1, 0.05), validation=day(2, 0.05), effects=NAMES)
+    assert found.verdict == "named_with_remainder"
+    assert [one.label for one in found.effects] == ["radiation(plate, room)"]
+    value, std, _ = found.effects[0].values["coefficient"]
+    assert abs(value - 1e-9) < std < value
+    assert found.gap["validation"].after < 0.7 * found.gap["validation"].before
 
 
 def test_beside_a_wandering_supply_radiation_is_said_to_predict_the_other_day(unexplained: Diagnosis) -> None:

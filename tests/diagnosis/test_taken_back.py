@@ -25,6 +25,7 @@ class Answer:
     state: State
     verdict: str = "unexplained"
     why: str = ""
+    validation: Validation | None = None
 
 
 @pytest.mark.parametrize(("kept", "tested", "answer"), [
@@ -48,6 +49,6 @@ def test_what_is_left_is_tested_again(monkeypatch: pytest.MonkeyPatch, kept: tup
     monkeypatch.setattr(_graded, "predicting", lambda state, finer, validation: None)
     monkeypatch.setattr(_graded, "validated", lambda state, validation, progress: State(kept, nominal))
     monkeypatch.setattr(_graded, "with_rivals", lambda state, finer, validation: state)
-    monkeypatch.setattr(_graded, "_graded", lambda judged, state, finer, validation: state.rounds)
+    monkeypatch.setattr(_graded, "_graded", lambda judged, state, finer, validation: Answer(state, "named"))
     found = _graded.graded(Answer(begun), Validation(None), lambda stage: None)  # type: ignore[arg-type]
-    assert asked == tested and found == answer
+    assert asked == tested and found.state.rounds == answer
