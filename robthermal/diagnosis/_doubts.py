@@ -181,7 +181,7 @@ def confirmed(effects: Iterable[Found]) -> list[str]:
     effects : iterable of Found
         Named effects, with their evidence.
     """
-    return [f"{one.label} does not hold over parts of the training records; it is named because it takes "
+    return [f"Over parts of the training records {one.label} does not hold; it is named because it takes "
             f"{100.0 * one.evidence.predicted:.0f} % off what the validation records have without it."
             for one in effects if one.evidence is not None and one.evidence.predicted >= PREDICTED]
 
