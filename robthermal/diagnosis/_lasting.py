@@ -79,11 +79,16 @@ def _predicted(fit: Refit, nominal: Refit, place: int, validation: Validation | 
 
     0 for a swing or a step at a time of the training records: on another day it fits by accident.
     """
-    whole, bare = exact(fit), exact(nominal)
-    if validation is None or of_its_time(fit.structure.effects[place]):
-        return 0.0
-    plain = bare if len(whole.structure.effects) == 1 else without(whole, place, bare)
+    if validation is None or validation.data is None or of_its_time(fit.structure.effects[place]):
+        return 0.0  # before the effects are fitted without it: that costs
+    whole = exact(fit)
+    plain = _plain(whole, exact(nominal), place)
     return 0.0 if plain is None else _needed_held_out(whole, plain, validation)
+
+
+def _plain(whole: Refit, bare: Refit, place: int) -> Refit | None:
+    """The network as it is without one of its effects; None if nothing survives that."""
+    return bare if len(whole.structure.effects) == 1 else without(whole, place, bare)
 
 
 def _reproducible(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, place: int) -> float:
@@ -98,9 +103,8 @@ def _needed(whole: Refit, bare: Refit, place: int, validation: Validation | None
     A swing or a step at a time of the training records may fit there what others leave: beside these it is needed only
     if it is on validation records, where there are any, by the part of their rms that a whole set has to remove.
     """
-    alone = len(whole.structure.effects) == 1
-    plain = bare if alone else without(whole, place, bare)
-    trained = not alone and of_its_time(whole.structure.effects[place])
+    plain = _plain(whole, bare, place)
+    trained = plain is not bare and of_its_time(whole.structure.effects[place])
     if trained and plain is not None and validation is not None and validation.data is not None:
         return 1.0 - math.sqrt(max(1.0 - _needed_held_out(whole, plain, validation), 0.0))
     before, after = _excess(whole if plain is None else plain, whole), _excess(whole, whole)

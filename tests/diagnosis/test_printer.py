@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -13,7 +14,7 @@ from robthermal.diagnosis._found import Found
 from robthermal.diagnosis._judge import Judged, Validation
 from robthermal.diagnosis._lasting import evidence_of
 from robthermal.diagnosis.evidence import Evidence, Stability
-from robthermal.diagnosis.fit import Refit
+from robthermal.diagnosis.fit import Refit, Whitened, relinearized
 from robthermal.diagnosis.search import SearchState, accept, begin, refit_candidates
 
 from ..printer import bed_alone, measured, of_bed, program, system, without_fan
@@ -54,6 +55,19 @@ def test_an_effect_that_training_hardly_shows_is_confirmed_by_what_it_predicts(
     hot = Validation(of_bed(measured(13, *program(13, 900, [60.0, 80.0, 100.0]))))
     confirmed, = evidence_of(state.rounds, state.fit, nominal, hot)
     assert confirmed.lasting and confirmed.predicted > 0.99 and confirmed.stability == alone.stability
+
+
+def test_a_size_that_is_three_times_too_large_is_not_confirmed(hardly_excited: tuple[SearchState, Refit]) -> None:
+    """The right effect at a wrong size, everything else as it is: the hot day is hardly better than without it."""
+    state, nominal = hardly_excited
+    v = state.fit.v.copy()
+    v[state.fit.structure.column_of(0)] *= 3.0
+    wrong = relinearized(replace(state.fit, v=v, z=Whitened(state.fit.structure, state.fit.whiteners).residual(v)))
+    hot = Validation(of_bed(measured(13, *program(13, 900, [60.0, 80.0, 100.0]))))
+    found, = evidence_of(state.rounds, wrong, nominal, hot)
+    assert wrong.structure.quantities(v)[0]["gain"] == pytest.approx(
+        3.0 * state.fit.structure.quantities(state.fit.v)[0]["gain"])
+    assert not found.lasting and found.predicted < 0.9
 
 
 def test_an_effect_that_another_day_confirms_says_so() -> None:
