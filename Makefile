@@ -8,6 +8,8 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 # Tests run in two processes, each file in one of them, so that what a file shares is made once; one BLAS thread each
 # keeps them from fighting for the cores.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
+# Containers often forbid Python to keep compiled modules: every command that a test starts would compile all of them again.
+export PYTHONDONTWRITEBYTECODE :=
 # Which tests `make test` runs; with MARK= all of them, as CI does.
 MARK ?= not exhaustive
 

@@ -19,8 +19,8 @@ _EVALUATIONS = 20  # without an effect: where it is strong the misfit is large, 
 _SURE = 8.0  # standard deviations of a size that is certainly worth a ΔBIC of 10
 
 
-def revised(rounds: tuple[Accepted, ...], nominal: Refit, effects: Iterable[str] | None, *, last_is_new: bool = False
-            ) -> tuple[tuple[Accepted, ...], Refit]:
+def revised(rounds: tuple[Accepted, ...], nominal: Refit, effects: Iterable[str] | None, *, last_is_new: bool = False,
+            share: float = 0.0) -> tuple[tuple[Accepted, ...], Refit]:
     """Choose each effect again with the others in place, until none changes; drop what is not needed any more.
 
     Parameters
@@ -33,28 +33,44 @@ def revised(rounds: tuple[Accepted, ...], nominal: Refit, effects: Iterable[str]
         Effects of the catalog to try.
     last_is_new : bool
         Whether the last one was chosen a moment ago with the others in place, and need not be again at first.
+    share : float
+        Of the misfit beyond noise, that choosing each of them once has to remove for doing it a second time.
     """
     names = None if effects is None else list(effects)
     fit = rounds[-1].best.fit
     decisions = list(rounds)
-    for sweep in range(_SWEEPS):
-        changed = False
-        for place in range(len(decisions) - 1 - (last_is_new and sweep == 0), -1, -1):
-            again = _chosen_again(decisions, fit, place, nominal, names)
-            if again is None:
-                continue
-            old = decisions.pop(place)
-            if isinstance(again, Refit):
-                fit, changed = again, True
-                break
-            # the effect chosen again stands last in the new structure: keep the order of the decisions the same
-            decisions.append(again)
-            fit = again.best.fit
-            changed = changed or again.best.candidate.key != old.best.candidate.key
-        if not changed:
+    for _ in range(_SWEEPS):
+        before, n = fit, len(decisions)
+        decisions, fit, changed = _swept(decisions, fit, nominal, names, last_is_new)
+        last_is_new = len(decisions) == n  # chosen a moment ago, beside the others as they are: none was dropped
+        if not changed or (share > 0.0 and _removed(before, fit) < share):
             break
     kept, less = needed(tuple(decisions), fit, nominal)
     return revised(kept, nominal, names) if 0 < len(kept) < len(decisions) else (kept, less)
+
+
+def _swept(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, names: list[str] | None, last_is_new: bool
+           ) -> tuple[list[Accepted], Refit, bool]:
+    """Each effect chosen again, the last one first, until one is dropped; whether any is another one now."""
+    decisions, changed = list(rounds), False
+    for place in range(len(decisions) - 1 - last_is_new, -1, -1):
+        again = _chosen_again(decisions, fit, place, nominal, names)
+        if again is None:
+            continue
+        old = decisions.pop(place)
+        if isinstance(again, Refit):
+            return decisions, again, True
+        # the effect chosen again stands last in the new structure: keep the order of the decisions the same
+        decisions.append(again)
+        fit = again.best.fit
+        changed = changed or again.best.candidate.key != old.best.candidate.key
+    return decisions, fit, changed
+
+
+def _removed(before: Refit, after: Refit) -> float:
+    """Share of the misfit beyond noise that is gone, with the filters that were there before."""
+    power = float(np.sum(Whitened(after.structure, before.whiteners).residual(after.v) ** 2))
+    return (before.rss - power) / max(before.rss - before.n_readings, 1e-9)
 
 
 def _chosen_again(rounds: Sequence[Accepted], fit: Refit, place: int, nominal: Refit, names: list[str] | None

@@ -21,6 +21,7 @@ from ._state import SearchState
 
 MOST_EFFECTS = 3
 _LARGE = 1.5  # whitened variance
+_NEARER = 0.5  # of the misfit beyond noise, that choosing again has to remove where a large one is left
 _LEAST = 0.3  # share of a large misfit that the last effect allowed must promise: it has to explain all of it
 
 
@@ -119,7 +120,7 @@ def reconsider(state: SearchState) -> SearchState:
     """
     if not state.misfit_left or len(state.rounds) < 2:
         return state
-    rounds, fit = revised(state.rounds, state.nominal, state.names, last_is_new=True)
+    rounds, fit = revised(state.rounds, state.nominal, state.names, last_is_new=True, share=_NEARER)
     again = extended(state.fit, fit.structure, fit.v)  # with the filters that the others had
     if fit.n_readings * math.log(state.fit.rss / again.rss) < BIC_GAP:
         return state
