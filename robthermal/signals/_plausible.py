@@ -13,26 +13,43 @@ from ._checks import Array
 
 RowLabel = Callable[[int], str]
 
+_STEP = 100.0  # K from a row to the next: a change of the unit is 273
 _MILLI = 100.0  # a current this many times beyond its limits is in mA
 
 
-def check_temperature(name: str, column: Array, stamps: Array, unit: str, row: RowLabel, where: str) -> None:
-    """Refuse a column whose numbers belong to the other scale; nan is no reading."""
-    wrong = np.flatnonzero(column < LOWEST_KELVIN if unit == "K" else column > HIGHEST_CELSIUS)
-    if not wrong.size:
+def check_temperature(name: str, column: Array, stamps: Array, unit: str, row: RowLabel, where: str,
+                      hottest: float | None = None) -> None:
+    """Refuse a column whose numbers belong to the other scale; nan is no reading, `hottest` [°C] has been declared."""
+    highest = HIGHEST_CELSIUS if hottest is None else hottest
+    wrong = np.flatnonzero(column < LOWEST_KELVIN if unit == "K" else column > highest)
+    if not wrong.size or (unit != "K" and hottest is None and _heats_up(column)):
         return
     k = int(wrong[0])
+    remedy = "Correct temperature_unit, or the readings if single rows are wrong."
     if unit == "K":
         looks, bound = "Celsius", f"below {LOWEST_KELVIN:g} K"
+        remedy += f" Machines colder than {LOWEST_KELVIN:g} K are not modelled."
     else:
-        looks, bound = "kelvin", f"above {HIGHEST_CELSIUS:g} °C"
+        looks, bound = "kelvin", f"above {highest:g} °C"
+        remedy += " If the machine is so hot, say how hot it gets: hottest = … in [record], in °C."
     raise InputError(
         f"column {name!r} holds {column[k]:.6g} in {row(k)}, time {stamps[k]:.10g} s, declared {unit}: "
         f"{bound}, this looks like {looks} ({wrong.size} of {int(np.isfinite(column).sum())} rows)",
         where=where,
         expected=f"temperatures in {unit}",
-        remedy="Correct temperature_unit, or the readings if single rows are wrong.",
+        remedy=remedy,
     )
+
+
+def _heats_up(column: Array) -> bool:
+    """Whether a column is of a machine that gets as warm as kelvin look: it passes what is between, row by row.
+
+    No reading in kelvin falls below 150, and rows in the other unit, zeros and spikes jump across what is between.
+    """
+    read = column[np.isfinite(column)]
+    with np.errstate(over="ignore"):
+        steps = np.abs(np.diff(read))
+    return all(bool((steps[np.diff(read > bound)] <= _STEP).any()) for bound in (LOWEST_KELVIN, HIGHEST_CELSIUS))
 
 
 def limit_notes(columns: Mapping[str, Array], current_limits: Any, input_limits: Any, where: str) -> list[str]:

@@ -189,10 +189,12 @@ def _part_kelvin(part: Any, key: str, unit: str, where: str) -> Any:
     value = float(part[key])
     if unit == "K" and value < LOWEST_KELVIN:
         raise InputError(f"{value} K is below {LOWEST_KELVIN:.0f} K: it looks like degrees Celsius declared as kelvin",
-                         where=where, remedy='Set temperature_unit = "degC", or give kelvin.')
+                         where=where, remedy='Set temperature_unit = "degC", or give kelvin. Machines colder than '
+                                             f"{LOWEST_KELVIN:.0f} K are not modelled.")
     if unit == "degC" and value > HIGHEST_CELSIUS:
         raise InputError(f"{value} °C is above {HIGHEST_CELSIUS:.0f} °C: it looks like kelvin declared as Celsius",
-                         where=where, remedy='Set temperature_unit = "K", or give degrees Celsius.')
+                         where=where, remedy='Set temperature_unit = "K", or give degrees Celsius. A part that is '
+                                             "so hot is given in a file in kelvin.")
     return {**part, key: _convert(value) if unit == "degC" else value}
 
 

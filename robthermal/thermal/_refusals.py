@@ -117,7 +117,8 @@ def _shown(value: Any) -> str:
 
 def _remedy(kind: str, key: str, fault: ErrorDetails) -> str:
     if kind == "greater_than_equal" and fault["ctx"].get("ge") == 150.0:
-        return "This is below 150 K: it looks like degrees Celsius declared as kelvin; check temperature_unit."
+        return ("This is below 150 K: it looks like degrees Celsius declared as kelvin; check temperature_unit. "
+                "Machines that cold are not modelled.")
     if kind in ("greater_than", "greater_than_equal"):
         return "Check the sign and the unit."
     return "Correct this value."

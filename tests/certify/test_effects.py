@@ -7,7 +7,7 @@ import robthermal as rt
 
 CURRENT, BOX = {"m1": (0.0, 0.5), "m2": (0.0, 0.5)}, (280.0, 330.0)
 PLACES = {"module": "m1", "lump": "x6", "ambient": "room", "link": "x1-x3", "sensor": "T6", "input": "heater",
-          "input or module": "m1"}
+          "input or module": "m1", "lump or ambient": "room"}
 OWN = {"natural_convection", "radiation", "missing_link", "missing_ambient_link", "hidden_mass", "path_mass",
        "sensor_lag", "sensor_offset", "sensor_gain", "seebeck_slope", "resistance_slope", "conductance_slope",
        "driven_heat"}  # plain system content: a heater with another gain

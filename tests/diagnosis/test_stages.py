@@ -12,7 +12,8 @@ import pytest
 import robthermal as rt
 from robthermal.diagnosis import _searching, search
 from robthermal.diagnosis.evidence import validation_data
-from robthermal.diagnosis.fit import NoiseScaling
+from robthermal.diagnosis.fit import NoiseScaling, extended
+from robthermal.diagnosis.search import _revise
 
 Hide = Callable[..., tuple[rt.Record, rt.Record]]
 FEW = ("natural_convection", "sensor_lag", "sensor_offset")
@@ -98,6 +99,38 @@ def test_an_effect_that_needs_no_place_is_dropped_by_revision(plant: rt.System, 
     state = replace(search.begin(fit, FEW), fit=found.fit, complete=True, rounds=(
         search.Accepted(fit, best=rt.diagnosis.Entry(offset, found.fit, 100.0, 0.0)),))
     assert search.revise(state).rounds == ()
+
+
+@pytest.mark.parametrize(("removed", "share", "asked"), [
+    (0.1, 0.0, "babc"),  # where no share is asked for, the second time too, but not at once what was chosen last
+    (0.6, 0.5, "babc"),
+    (0.1, 0.5, "ba")])
+def test_effects_are_chosen_a_second_time_where_the_first_removed_enough(
+        removed: float, share: float, asked: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def chosen(name: str) -> SimpleNamespace:
+        return SimpleNamespace(best=SimpleNamespace(fit=name, candidate=SimpleNamespace(key=name)))
+
+    seen: list[str] = []
+
+    def again(rounds: list[SimpleNamespace], fit: str, place: int, *_: object) -> SimpleNamespace:
+        seen.append(rounds[place].best.candidate.key[0])
+        return chosen(seen[-1] + "2" * (len(seen) == 1))  # the first one asked is another effect now
+
+    monkeypatch.setattr(_revise, "_chosen_again", again)
+    monkeypatch.setattr(_revise, "_removed", lambda before, after: removed)
+    monkeypatch.setattr(_revise, "needed", lambda rounds, fit, nominal: (rounds, fit))
+    rounds, fit = _revise.revised(tuple(map(chosen, "abc")), None, None, last_is_new=True, share=share)
+    assert "".join(seen) == asked and fit == rounds[-1].best.fit
+    assert sorted(one.best.candidate.key[0] for one in rounds) == ["a", "b", "c"]
+
+
+def test_the_share_of_a_misfit_that_is_gone_is_that_of_the_same_filters(accepted: search.SearchState) -> None:
+    """What is left in the end is noise: all but 1 / (variance before) is gone, whatever filters the later fit has."""
+    before, after = accepted.nominal, accepted.fit
+    assert _revise._removed(before, before) == pytest.approx(0.0, abs=1e-9)
+    removed = _revise._removed(before, after)
+    alike = extended(before, after.structure, after.v, 1)
+    assert removed == pytest.approx((before.rss - alike.rss) / (before.rss - before.n_readings)) and 0.9 < removed < 1.1
 
 
 def test_validation_data_keep_an_effect_that_holds_and_take_back_one_that_does_not(

@@ -16,7 +16,7 @@ ORDER = """seebeck_slope resistance_slope conductance_slope thomson joule_split 
     heat_source ambient_gradient hidden_mass path_mass periodic_load condensation input_gain input_offset
     input_saturation input_gain_slope input_delay input_lag heater_power_slope input_feedthrough driven_heat
     sensor_lag sensor_offset sensor_gain sensor_self_heating""".split()
-KINDS = {"module", "lump", "ambient", "link", "sensor", "input", "input or module"}
+KINDS = {"module", "lump", "ambient", "link", "sensor", "input", "input or module", "lump or ambient"}
 TOY = '''"""A fan that blows on a lump while its heater is on."""
 
 from robthermal.thermal.effects import Effect, Quantity

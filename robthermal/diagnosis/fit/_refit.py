@@ -223,8 +223,16 @@ class Refit:
             return "standard deviations"
         return "K" if any(name in self.system.thermometers for name in self._read) else "V"
 
+    @cached_property
+    def span(self) -> float:
+        """Range of the temperatures that the records hold [K]; 0 without any."""
+        read = [path.one.readings[:, [name in self.system.thermometers for name in path.one.sensors]]
+                for path in self.records]
+        ends = [(float(np.nanmin(one)), float(np.nanmax(one))) for one in read if one.size]
+        return max((high for _, high in ends), default=0.0) - min((low for low, _ in ends), default=0.0)
+
     def testable(self, tested: Iterable[Candidate]) -> list[Candidate]:
-        """Candidates that these data may show.
+        """Candidates that these data may show, and that the fit does not have already.
 
         Parameters
         ----------
@@ -235,7 +243,10 @@ class Refit:
         -------
         list of Candidate
         """
-        return [candidate for candidate in tested if not self.structure.hides(candidate)]
+        taken = {candidate.key for candidate in self.structure.effects}
+        return [candidate for candidate in tested if candidate.key not in taken
+                and candidate.effect.span(self.system, candidate.where) <= self.span
+                and not self.structure.hides(candidate)]
 
     @cached_property
     def covariance(self) -> Array:

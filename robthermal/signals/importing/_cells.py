@@ -162,10 +162,12 @@ def refuse_codes(table: Table, header: str, raw: Array, declared: ImportOptions,
     declared : ImportOptions
         Import options, of which `missing` is used.
     temperature : bool
-        Whether the cells are temperatures: then a code that stays until the end is a broken sensor too.
+        Whether the cells are temperatures: then a code that stays until the end is a broken sensor too, and 85 may be
+        what a sensor says after power-up.
     """
     known = {float(code) for code in declared.missing if not isinstance(code, str)}
-    doubted = [code for code in (*_CODES, _DOUBTED) if code not in known and (raw == code).any()]
+    codes = (*_CODES, _DOUBTED) if temperature else _CODES
+    doubted = [code for code in codes if code not in known and (raw == code).any()]
     if not doubted:
         return
     index = np.flatnonzero(np.isfinite(raw))

@@ -85,6 +85,8 @@ class ImportOptions(_Table):
         Headers of a file that has none.
     temperature_unit : {"K", "degC"}, optional
         Of temperature columns without a unit; default the system's.
+    hottest : float, optional
+        Largest reading of a machine that is above 250 °C in every row [degC]: else such a column looks like kelvin.
     missing : tuple of float or str
         Fault codes that stand for a missing reading.
     gaps : {"split", "fill", "refuse"}
@@ -127,6 +129,7 @@ class ImportOptions(_Table):
     variable: str | None = None
     header: tuple[str, ...] | None = None
     temperature_unit: Literal["K", "degC"] | None = None
+    hottest: Positive | None = None
     missing: tuple[float | str, ...] = ()
     gaps: Literal["split", "fill", "refuse"] = "split"
     fill_up_to: Annotated[int, Field(ge=1)] = 3

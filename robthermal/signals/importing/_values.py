@@ -150,7 +150,7 @@ def _check(table: Table, channel: Channel, raw: Array, choice: Declared, clock: 
         def words(row: int) -> str:
             return table.place(row).rpartition(", ")[2]
 
-        check_temperature(header, raw, clock.seconds, unit, words, table.where)
+        check_temperature(header, raw, clock.seconds, unit, words, table.where, choice.record.hottest)
 
 
 def check_limits(table: Table, values: Values, system: SystemLike) -> None:

@@ -14,7 +14,8 @@ from ._effect import Effect
 from ._response import Values, Where
 
 _TABLES = {"module": ("modules",), "lump": ("lumps",), "ambient": ("ambients",), "link": ("links",),
-           "sensor": ("sensors",), "input": ("inputs",), "input or module": ("inputs", "modules")}
+           "sensor": ("sensors",), "input": ("inputs",), "input or module": ("inputs", "modules"),
+           "lump or ambient": ("lumps", "ambients")}
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,19 @@ def _visible(system: System, where: Where) -> str:
     return ""
 
 
+def _any(system: System, where: Where) -> float:
+    """Readings of any range [K] may show the effect.
+
+    Parameters
+    ----------
+    system : System
+        System without the effect.
+    where : tuple of str
+        Place of the effect.
+    """
+    return 0.0
+
+
 @dataclass(frozen=True)
 class Quantity:
     """A number of an effect.
@@ -84,8 +97,8 @@ class Effect:
     paired : str
         An angle among the quantities, with the grid (0, π/2): any other is a combination of these two.
     where : tuple of str
-        Kinds of the parts that it names, in order: "module", "lump", "ambient", "link", "sensor", "input", or
-        "input or module"; empty for an effect of your own.
+        Kinds of the parts that it names, in order: "module", "lump", "ambient", "link", "sensor", "input",
+        "input or module" or "lump or ambient"; empty for an effect of your own.
     meaning : str
         One sentence that says what physics it is.
     measure : str
@@ -96,6 +109,9 @@ class Effect:
         Units of quantities that are more general in a system than in the search.
     hidden : callable
         ``hidden(system, where)`` says why a frequency response cannot show the effect; empty if it can.
+    span : callable
+        ``span(system, where)``: range of the readings [K] from which it is tried; in a smaller one another effect is
+        as good.
     forms : tuple of Effect
         Further forms of the same effect under the same name.
     rank : int
@@ -132,6 +148,7 @@ class Effect:
     nonnegative: tuple[str, ...] = field(default=(), kw_only=True)
     units: Mapping[str, str] = field(default_factory=dict, kw_only=True)
     hidden: Callable[[System, Where], str] = field(default=_visible, kw_only=True)
+    span: Callable[[System, Where], float] = field(default=_any, kw_only=True)
     forms: tuple[Effect, ...] = field(default=(), kw_only=True)
     rank: int = field(default=LAST, kw_only=True)
 
