@@ -195,6 +195,17 @@ def test_boxes_of_a_system_in_kelvin(folder: Path) -> None:
         rt.jobs.request.boxes_from_text(system, temperature=(5.0, 85.0))
 
 
+def test_a_box_of_a_hot_machine_begins_cold(folder: Path) -> None:
+    """No range in kelvin does; one that begins hot is written in kelvin."""
+    system = rt.read_system(folder / "bench.toml")
+    boxes = rt.jobs.request.boxes_from_text(system, temperature=(10.0, 700.0))
+    assert boxes.temperature == pytest.approx((283.15, 973.15))
+    with pytest.raises(rt.InputError, match=r'300 °C is above 250 °C: it looks like kelvin.*temperature_unit = "K"'):
+        rt.jobs.request.boxes_from_text(system, temperature=(300.0, 700.0))
+    with pytest.raises(rt.InputError, match="283 °C is above 250 °C"):
+        rt.jobs.request.boxes_from_text(system, temperature=(283.0, 293.0))
+
+
 def test_how_records_are_read_is_said_in_the_project_or_beside_one_of_them(tmp_path: Path) -> None:
     rt.jobs.new_project(tmp_path / "mine")
     folder = tmp_path / "mine"

@@ -361,11 +361,15 @@ def _boxes(system: System, table: CertifyTable, confidence: float, path: Path, a
                  confidence=confidence, set=table.set, temperature_lower=table.temperature_lower)
 
 
-def in_kelvin(value: float, unit: str, where: str) -> float:
-    """A temperature in the unit of a system file [K]; what looks like the other unit is refused."""
-    if unit == "degC" and value > _HOTTEST_CELSIUS:
+def in_kelvin(value: float, unit: str, where: str, low: float | None = None) -> float:
+    """A temperature in the unit of a system file [K]; what looks like the other unit is refused.
+
+    Nothing looks like kelvin that is the upper end of a range whose lower end does not.
+    """
+    if unit == "degC" and value > _HOTTEST_CELSIUS and not (low is not None and low < _COLDEST_KELVIN):
         raise InputError(f"{value:g} °C is above {_HOTTEST_CELSIUS:g} °C: it looks like kelvin", where=where,
-                         remedy="The system file says degC: give degrees Celsius.")
+                         remedy="The system file says degC: give degrees Celsius. For a machine that is so hot write "
+                                'it in kelvin, with temperature_unit = "K".')
     if unit == "K" and value < _COLDEST_KELVIN:
         raise InputError(f"{value:g} K is below {_COLDEST_KELVIN:g} K: it looks like degrees Celsius", where=where,
                          remedy="The system file says K: give kelvin.")
@@ -374,4 +378,4 @@ def in_kelvin(value: float, unit: str, where: str) -> float:
 
 def range_in_kelvin(pair: Pair, unit: str, where: str) -> tuple[float, float]:
     """Both ends of a range [K]."""
-    return in_kelvin(pair[0], unit, where), in_kelvin(pair[1], unit, where)
+    return in_kelvin(pair[0], unit, where), in_kelvin(pair[1], unit, where, low=pair[0])
