@@ -43,13 +43,13 @@ def test_a_crucible_that_touches_the_muffle_is_not_said_to_be_radiated_to() -> N
     assert lag.where == ("T_crucible",) and abs(value - furnace.LAG) < 4.0 * std < 2.0
 
 
-def test_radiation_between_lumps_is_tried_where_the_readings_cover_a_hundred_kelvins() -> None:
+def test_radiation_between_lumps_is_tried_where_the_readings_cover_eighty_kelvins() -> None:
     lumps = {("muffle", "insulation"), ("muffle", "crucible"), ("insulation", "crucible")}
     to_room = {(lump, "room") for lump in furnace.declared().lumps}
     wide = rt.diagnosis.refit(furnace.declared(), furnace.day(4, [150.0], n=100))
     small = rt.diagnosis.refit(furnace.declared(), furnace.day(4, [90.0], n=100))
     assert wide.span > 110.0 and pairs_tried(wide) == to_room | lumps
-    assert 60.0 < small.span < 90.0 and pairs_tried(small) == to_room
+    assert 60.0 < small.span < 80.0 and pairs_tried(small) == to_room
 
 
 def test_what_a_fit_has_already_is_not_tried_again_at_the_same_place() -> None:

@@ -182,7 +182,7 @@ class Dates(CellReader):
             text = text.str.replace(",", ".", regex=False).where(zoned == self._zoned)
             found = pd.to_datetime(text, format="ISO8601", errors="coerce", utc=self._zoned)
         else:
-            if "%S" in pattern and "%f" not in pattern and self._options.time_format is None:
+            if "%S" in pattern and "%f" not in pattern:  # a declared order of day and month says nothing of decimals
                 if text.str.contains(r":\d{2}[.,]\d", regex=True).any():
                     self._fraction = True
                     pattern = pattern.replace("%S", "%S.%f")

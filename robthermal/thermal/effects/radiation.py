@@ -11,7 +11,7 @@ from ._places import ambient_pairs_without
 from ._response import Array, Values, Where
 from ._signatures import exchanged
 
-_SPAN = 100.0  # K: from 300 to 400 K the heat for the same difference more than doubles
+_SPAN = 80.0  # K: from 300 to 380 K the heat for the same difference doubles
 
 _add = new_link(lambda values: {"radiation": values["coefficient"]}, {"coefficient": "radiation"})
 _to_ambients = ambient_pairs_without("radiation")
