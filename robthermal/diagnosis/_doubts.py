@@ -143,8 +143,8 @@ def surfaces(effects: Sequence[Found]) -> list[str]:
     effects : sequence of Found
         Named effects with their sizes.
     """
-    return [f"Radiation of this size needs a surface of at least {_area(one.values['coefficient'][0])} (black): if "
-            f"{one.where[0]} has less, another loss hides in it."
+    return [f"Radiation of this size between {' and '.join(one.where)} needs a surface of at least "
+            f"{_area(one.values['coefficient'][0])} (black): if {one.where[0]} has less, another loss hides in it."
             for one in effects if one.effect == "radiation" and "coefficient" in one.values]
 
 

@@ -3,6 +3,9 @@
 What a finer network would change has many unknowns, which can fit a body that loses heat somewhere else. An effect that
 needs none of them, and takes nearly all of the error off data that no fit has seen, is the better explanation. Where a
 finer network leaves much more of the training records than the effects do, it explains nothing away.
+
+What is coarse in a network shows as heat that is stored elsewhere, or comes late, and hardly as a path of heat: a mass
+or a lag has to do more than other effects.
 """
 
 from __future__ import annotations
@@ -19,6 +22,8 @@ from .fit import Refit, coarsened, exact
 from .search import SearchState
 
 _CLOSED = 0.92  # of the excess mean square, that an effect removes which needs no finer network
+_CLOSED_BY_PATHS = 0.85  # the same, where none of the effects stores heat or is late
+_STORING = ("hidden_mass", "path_mass", "sensor_lag", "input_lag", "input_delay")
 _MISFIT = 2.0  # whitened variance that a finer network leaves, to explain nothing away
 _RENEWED = 3  # times
 _FAR_LESS = 0.5  # of the excess mean square that it leaves: no more may be left by the effects
@@ -44,7 +49,7 @@ def predicting_alone(state: SearchState, finer: Refit, validation: Validation) -
     kept = lasting(replace(state, misfit_left=False), nominal, validation)
     if not kept.rounds:
         return None
-    share = CLOSED_SQUARE if leaves_far_more(finer, kept.fit) else _CLOSED
+    share = CLOSED_SQUARE if leaves_far_more(finer, kept.fit) else _needed(kept)
     if not _closes(kept.fit, nominal, validation, share):
         return None
     listed = with_rivals(kept, nominal, validation)
@@ -52,6 +57,12 @@ def predicting_alone(state: SearchState, finer: Refit, validation: Validation) -
         replace(round_, contenders=tuple(entry for entry in round_.contenders
                                          if _closes(entry.fit, nominal, validation, share)))
         for round_ in listed.rounds)))
+
+
+def _needed(state: SearchState) -> float:
+    """Share of the excess mean square that these effects have to remove where a finer network would, too."""
+    storing = any(round_.best.candidate.effect.name in _STORING for round_ in state.rounds)
+    return _CLOSED if storing else _CLOSED_BY_PATHS
 
 
 def closing(state: SearchState, validation: Validation) -> bool:

@@ -8,10 +8,12 @@ from __future__ import annotations
 import sys
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import robthermal as rt
+from robthermal.diagnosis import _explained_away
 from robthermal.diagnosis._explained_away import predicting_alone
 from robthermal.diagnosis._judge import Validation
 from robthermal.diagnosis.fit import Refit, coarsened
@@ -85,6 +87,26 @@ def test_a_place_that_does_little_beside_a_finer_network_is_listed_where_it_does
     found = diagnosed(one, validation=one.unseen)
     (name,), (others,) = found.effects, found.alternatives
     assert {name.where, *(where for _, where in others)} == {("cold", "room"), ("spreader", "room")}
+
+
+@pytest.mark.exhaustive
+def test_a_share_of_a_heater_that_closes_seven_eighths_is_named():
+    """In training 87 % of the gap, 94 % of the other day's; lumps that are too few do not move heat from its heater."""
+    one = made(Case("bar", "hidden", "input_feedthrough", 54))
+    found = rt.diagnose(one.system, one.train, validation=one.unseen,
+                        effects=["input_feedthrough", "hidden_mass", "heat_source", "missing_link"])
+    assert [name.label for name in found.effects] == ["input_feedthrough(q2, x6)"] and found.alternatives == ((),)
+    assert found.verdict == "named_with_remainder"
+    assert "would explain the training records without it" in found.outcome.text
+
+
+@pytest.mark.parametrize(("names", "share"), [
+    (["missing_link"], 0.85), (["input_feedthrough", "sensor_gain"], 0.85), (["hidden_mass"], 0.92),
+    (["missing_link", "sensor_lag"], 0.92)])
+def test_what_stores_heat_or_is_late_has_to_close_more(names: list[str], share: float):
+    rounds = [SimpleNamespace(best=SimpleNamespace(candidate=SimpleNamespace(effect=SimpleNamespace(name=name))))
+              for name in names]
+    assert _explained_away._needed(SimpleNamespace(rounds=rounds)) == share
 
 
 @pytest.mark.exhaustive
