@@ -9,10 +9,11 @@ import pytest
 
 import robthermal as rt
 from robthermal.diagnosis.plan import rivals, trial_conditions
-from robthermal.diagnosis.plan._next_experiment import _clearest
+from robthermal.diagnosis.plan._next_experiment import _alike, _clearest
 from robthermal.diagnosis.plan._separation import hypotheses_of, separation
 from robthermal.diagnosis.plan._trial_inputs import limits_of
 from robthermal.diagnosis.plan._trial_search import LONGEST, Trial, search_of
+from robthermal.diagnosis.search import refit_set
 
 Array = np.ndarray
 H, ROOM = 5.0, 298.15
@@ -285,3 +286,17 @@ def test_no_record_is_planned_for_sensors_of_unknown_noise(bench: rt.System) -> 
     found = rt.diagnose(silent, answered(truth(delay=0.5), 5), operating_point={"heater": 4.5},
                         effects=["input_delay", "input_lag"])
     assert found.verdict == "ambiguous" and found.next_experiment is None
+
+
+def test_an_alias_of_a_swing_has_its_period_also_where_another_effect_was_chosen_later(
+        plant: rt.System, hide: Callable[..., tuple[rt.Record, rt.Record]]) -> None:
+    """The swing is then not the last effect of its fit."""
+    nominal = rt.diagnosis.refit(plant, hide(n=200)[0])
+    swing, alias = rt.diagnosis.candidates(plant, ["periodic_load"])[:2]
+    (lag, *_) = rt.diagnosis.candidates(plant, ["sensor_lag"])
+    both = (swing.trials(nominal.paths[0])[0], lag.trials(nominal.paths[0])[0])
+    fit = refit_set(nominal, both, [0.3, 2.0]).fit
+    entry = rt.diagnosis.Entry(next(one for one in fit.structure.effects if one.key == swing.key), fit, 0.0, 0.0)
+    ((found,), (size,)) = _alike(nominal, alias, entry)
+    assert found.key == alias.key and np.isfinite(size)
+    assert found.shape == {name: entry.found[name] for name in ("period", "phase")}

@@ -189,7 +189,7 @@ def _alias(before: Refit, alias: Candidate, entry: Entry) -> list[Entry]:
 
 def _alike(before: Refit, alias: Candidate, entry: Entry) -> tuple[tuple[Candidate], list[float]]:
     """A sine with the period and phase of the one it is an alias of, and the size that changes the readings as much."""
-    values = dict(entry.fit.structure.quantities(entry.fit.v)[-1])
+    values = dict(entry.found)
     size = values.pop(entry.candidate.effect.size.name)
     pair = [replace(candidate, shape=values) for candidate in (alias, entry.candidate)]
     own, other = before.whiten([path.columns(pair) for path in before.paths]).T
