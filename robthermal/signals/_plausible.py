@@ -13,6 +13,7 @@ from ._checks import Array
 
 RowLabel = Callable[[int], str]
 
+_COLD = 60.0  # °C: what a furnace begins at; in kelvin only liquid helium makes it
 _STEP = 100.0  # K from a row to the next: a change of the unit is 273
 _MILLI = 100.0  # a current this many times beyond its limits is in mA
 
@@ -44,12 +45,12 @@ def check_temperature(name: str, column: Array, stamps: Array, unit: str, row: R
 def _heats_up(column: Array) -> bool:
     """Whether a column is of a machine that gets as warm as kelvin look: it passes what is between, row by row.
 
-    No reading in kelvin falls below 150, and rows in the other unit, zeros and spikes jump across what is between.
+    No reading in kelvin is that low, and rows in the other unit, zeros and spikes jump across what is between.
     """
     read = column[np.isfinite(column)]
     with np.errstate(over="ignore"):
         steps = np.abs(np.diff(read))
-    return all(bool((steps[np.diff(read > bound)] <= _STEP).any()) for bound in (LOWEST_KELVIN, HIGHEST_CELSIUS))
+    return all(bool((steps[np.diff(read > bound)] <= _STEP).any()) for bound in (_COLD, LOWEST_KELVIN, HIGHEST_CELSIUS))
 
 
 def limit_notes(columns: Mapping[str, Array], current_limits: Any, input_limits: Any, where: str) -> list[str]:

@@ -39,6 +39,8 @@ def test_a_furnace_that_heats_up_is_in_celsius(tmp_path: Path, furnace: rt.Syste
     [293.1, 295.0, 310.0, 355.0],                    # kelvin
     [233.0, 245.0, 249.0, 251.0, 270.0],             # kelvin of a cooled stage, which passes 250
     [0.0, 233.0, 240.0, 251.0, 0.0, 280.0],          # the same with zeros of a fault
+    [293.0, 260.0, 220.0, 170.0, 140.0, 95.0, 80.0],  # kelvin of a cryostat, which is cooled
+    [293.0, 240.0, 0.0, 170.0, 140.0, 95.0, 80.0],   # the same with a zero
     [20.0, 25.0, 60.0, 333.2, 335.0],                # a logger that changes its unit
     [20.0, 25.0, 430.0, 26.0, 27.0],                 # a spike
     [120.0, 130.0, 405.0, 260.0, 240.0, 405.0],      # the same, from where a step is smaller
