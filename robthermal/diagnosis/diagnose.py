@@ -47,7 +47,7 @@ from ._other_log import asked_of_log
 from ._own_names import in_own_names
 from ._refine import refine as refined
 from ._searching import searched
-from ._steep_power import steep_powers
+from ._steep_power import falling_powers, steep_powers
 from ._visible_words import visible_in_words
 from ._with_names import ranged
 from ._wrong_columns import asked_of_columns
@@ -323,6 +323,8 @@ def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
         said += periods_undecided(state.rounds, verdict != "named")
         said += late_by_rows(state.fit)
         said += [*surfaces(found.effects), *steep_powers(found.effects)]
+    if verdict in ("named_with_remainder", "ambiguous"):
+        said += falling_powers(found.effects, nominal.span)
     said += at_bounds(state.fit, verdict)
     said += held_ambients(nominal)
     said += may_drift(nominal) if verdict == "unexplained" else far_ambients(found.ambients, nominal.system)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import furnace
 import pytest
 
 import robthermal as rt
 from robthermal.diagnosis import search
+from robthermal.diagnosis._steep_power import falling_powers
 
 LEVELS, OTHERS = [200.0, 450.0, 300.0, 600.0, 350.0, 150.0], [350.0, 550.0, 250.0, 480.0]
 
@@ -41,6 +44,31 @@ def test_a_crucible_that_touches_the_muffle_is_not_said_to_be_radiated_to() -> N
     (lag,) = [one for one in found.effects if one.effect == "sensor_lag"]
     value, std, _ = lag.values["time_constant"]
     assert lag.where == ("T_crucible",) and abs(value - furnace.LAG) < 4.0 * std < 2.0
+
+
+@pytest.mark.exhaustive
+def test_contact_is_named_where_the_file_has_radiation() -> None:
+    """The reverse: over 580 K a conductance is not taken for more radiation."""
+    given, fit = furnace.declared(), furnace.declared().fit
+    links = [link for link in given.links if set(link.between) != {"muffle", "crucible"}]
+    system = given.model_copy(update={
+        "links": (*links, rt.thermal.Link(between=("muffle", "crucible"), name="bare", radiation=1e-10)),
+        "fit": {name: one for name, one in fit.items() if "muffle-crucible" not in name}})
+    found = rt.diagnose(system, furnace.day(1, LEVELS, radiates=False),
+                        validation=furnace.day(51, OTHERS, radiates=False, n=600, room=24.0),
+                        effects=["missing_link", "radiation", "sensor_lag", "hidden_mass"])
+    assert ("missing_link", ("muffle", "crucible")) in {(one.effect, one.where) for one in found.effects}
+    assert not [one for one in found.effects if one.effect == "radiation"]
+
+
+def test_a_power_that_falls_over_a_wide_range_is_not_said_without_what_it_may_be() -> None:
+    def named(slope: float) -> list[SimpleNamespace]:
+        return [SimpleNamespace(effect="heater_power_slope", where=("ssr",), values={"slope": (slope, 1e-5, "1/K")})]
+
+    (said,) = falling_powers(named(-4.6e-4), 580.0)
+    assert said.startswith("Over 580 K") and "falls by 0.046 % per kelvin: measure voltage and current of ssr" in said
+    assert falling_powers(named(-4.6e-4), 60.0) == falling_powers(named(4.6e-4), 580.0) == []
+    assert falling_powers(named(-0.02), 580.0) == []  # of that something else is said
 
 
 def test_radiation_between_lumps_is_tried_where_the_readings_cover_eighty_kelvins() -> None:

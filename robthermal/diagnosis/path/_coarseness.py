@@ -38,7 +38,7 @@ def coarse_names(base: System) -> list[str]:
     out = [f"capacity between {a} and {b}" for a, b in _pairs(near)]
     out += [f"place of heater {name} toward {b}" for name, one in base.inputs.items() for b in near[one.lump]]
     for name, a in _read(base).items():
-        if near[a]:
+        if any(near[a].values()):
             out += [f"place of sensor {name} toward {b}" for b in [*near[a], *far[a]]]
             out += [f"place of sensor {name} near heater {q}" for q, one in base.inputs.items() if one.lump == a]
             out.append(f"lag of sensor {name} within {a}")
@@ -75,7 +75,7 @@ def coarse_responses(path: RecordContext, base: System) -> Iterator[Response]:
         for b in near[one.lump]:
             yield heat(b, one.lump, _SHARE * one.gain * u[name])
     for name, a in _read(base).items():
-        if not near[a]:
+        if not any(near[a].values()):  # nothing is conducted within: joined by radiation or air alone
             continue
         inside, own = 2.0 * sum(near[a].values()), T[:, at[a]]
         for b in near[a]:

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
+from ..._celsius import HIGHEST_CELSIUS, LOWEST_KELVIN
 from ...errors import InputError
 from ...signals import celsius_to_kelvin, declared
 from ...thermal import FitRange, System, fit_in_kelvin, read_system
@@ -28,7 +29,6 @@ from ._stage_tables import (
 from ._toml import Number, Table, read_toml, refusal
 
 _REMEDY = "See the documentation, \"Project file\", or start from the demo's."
-_COLDEST_KELVIN, _HOTTEST_CELSIUS = 150.0, 250.0  # as in system files
 Method = Literal["energy", "sum", "max", "lyapunov"]
 Structure = Literal["full", "block"]
 Direction = Literal["symmetric", "cooling", "heating"]
@@ -366,12 +366,12 @@ def in_kelvin(value: float, unit: str, where: str, low: float | None = None) -> 
 
     Nothing looks like kelvin that is the upper end of a range whose lower end does not.
     """
-    if unit == "degC" and value > _HOTTEST_CELSIUS and not (low is not None and low < _COLDEST_KELVIN):
-        raise InputError(f"{value:g} °C is above {_HOTTEST_CELSIUS:g} °C: it looks like kelvin", where=where,
+    if unit == "degC" and value > HIGHEST_CELSIUS and not (low is not None and low < LOWEST_KELVIN):
+        raise InputError(f"{value:g} °C is above {HIGHEST_CELSIUS:g} °C: it looks like kelvin", where=where,
                          remedy="The system file says degC: give degrees Celsius. For a machine that is so hot write "
                                 'it in kelvin, with temperature_unit = "K".')
-    if unit == "K" and value < _COLDEST_KELVIN:
-        raise InputError(f"{value:g} K is below {_COLDEST_KELVIN:g} K: it looks like degrees Celsius", where=where,
+    if unit == "K" and value < LOWEST_KELVIN:
+        raise InputError(f"{value:g} K is below {LOWEST_KELVIN:g} K: it looks like degrees Celsius", where=where,
                          remedy="The system file says K: give kelvin.")
     return float(celsius_to_kelvin(value)) if unit == "degC" else float(value)
 

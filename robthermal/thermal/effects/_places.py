@@ -51,10 +51,15 @@ def joined_pairs(system: System) -> set[frozenset[str]]:
     return pairs | {frozenset((m.hot, m.cold)) for m in system.modules.values()}
 
 
+def pairs_with(what: str, system: System) -> set[frozenset[str]]:
+    """Pairs of nodes between which there is such a term."""
+    return {frozenset(link.between) for link in system.links if getattr(link, what) is not None}
+
+
 def ambient_pairs_without(what: str) -> Callable[[System], Iterator[Where]]:
     """Lumps and ambients between which there is no such term yet."""
     def places(system: System) -> Iterator[Where]:
-        there = {frozenset(link.between) for link in system.links if getattr(link, what) is not None}
+        there = pairs_with(what, system)
         return (pair for pair in product(system.lumps, system.ambients) if frozenset(pair) not in there)
 
     return places

@@ -7,7 +7,7 @@ from itertools import combinations
 from .._system import System
 from ._builders import new_link
 from ._effect import Effect, Quantity
-from ._places import ambient_pairs_without
+from ._places import ambient_pairs_without, pairs_with
 from ._response import Array, Values, Where
 from ._signatures import exchanged
 
@@ -23,7 +23,7 @@ def _flow(Ta: Array, Tb: Array, values: Values) -> Array:
 
 def _places(system: System) -> list[Where]:
     """Lumps and ambients, and pairs of lumps, that do not radiate to each other yet."""
-    there = {frozenset(link.between) for link in system.links if link.radiation is not None}
+    there = pairs_with("radiation", system)
     return [*_to_ambients(system), *(pair for pair in combinations(system.lumps, 2) if frozenset(pair) not in there)]
 
 
