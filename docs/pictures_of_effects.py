@@ -46,6 +46,7 @@ PICTURES = {
     "ambient_gradient": Picture(("sink",), {"difference": 1.5}, "sink"),
     "conductance_step": Picture(("sample-plate",), {"relative": -0.4, "time": 1500.0}, "sample"),
     "driven_conductance": Picture(("sample-plate", "m1"), {"relative": 0.8}, "sample"),
+    "conductance_exponent": Picture(("sample-plate",), {"exponent": -2.0}, "sample"),
     "condensation": Picture(("plate",), {"conductance": 0.6, "dew_point": 293.15}),
     "heat_source": Picture(("plate",), {"heat": 1.0}),
     "hidden_mass": Picture(("plate",), {"capacity": 60.0, "time_constant": 200.0}),

@@ -16,9 +16,9 @@ SECTIONS = ("system", "region", "evidence", "margin", "made_by")
 _LARGEST = 20_000_000  # bytes
 _DEEPEST = 100  # nested objects and lists
 # effects of a system file beyond the plain network
-_EFFECTS = frozenset(("leads", "heat", "gradient", "periodic", "condensation", "step", "follow", "thomson",
-                      "joule_split", "hysteresis", "drive", "power_slope", "feedthrough", "self_heating",
-                      "flows"))
+_EFFECTS = frozenset(("leads", "heat", "gradient", "periodic", "condensation", "step", "follow", "temperature_law",
+                      "thomson", "joule_split", "hysteresis", "drive", "power_slope", "feedthrough",
+                      "self_heating", "flows"))
 
 
 class Unreadable(Exception):

@@ -107,7 +107,8 @@ class ConvectionLaw:
         """
         areas = film_areas(system, ambient, film)
         links = tuple(Link(between=link.between, name=link.name, radiation=link.radiation, step=link.step,
-                           follow=link.follow, **_keys(self, areas[link.name])) if link.name in areas else link
+                           follow=link.follow, temperature_law=link.temperature_law,
+                           **_keys(self, areas[link.name])) if link.name in areas else link
                       for link in system.links)
         return system.model_copy(update={"links": links})
 

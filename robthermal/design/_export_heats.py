@@ -104,6 +104,13 @@ def _follow(p: Any, N: Row, w: Row, q: Row) -> None:
     q[p.b] -= flow
 
 
+def _power(p: Any, N: Row, w: Row, q: Row) -> None:
+    a, b = N[p.a] + p.warmer_a, N[p.b] + p.warmer_b
+    flow = p.conductance * ((0.5 * (a + b) / p.T_ref) ** p.exponent - 1.0) * (b - a)
+    q[p.a] += flow
+    q[p.b] -= flow
+
+
 def _condensation(p: Any, N: Row, w: Row, q: Row) -> None:
     q[p.a] += p.conductance * (p.dew_point - N[p.a]) if N[p.a] < p.dew_point else 0.0
 
@@ -142,6 +149,10 @@ HEATS = {
     "FollowTerm": Heat(("a", "b", "drive", "conductance", "relative", "warmer"), (
         "double flow = p->conductance * p->relative * fabs(w[p->drive]) * (N[p->b] - N[p->a] + p->warmer);",
         "q[p->a] += flow;", "q[p->b] -= flow;"), _follow),
+    "PowerTerm": Heat(("a", "b", "conductance", "exponent", "T_ref", "warmer_a", "warmer_b"), (
+        "double a = N[p->a] + p->warmer_a, b = N[p->b] + p->warmer_b;",
+        "double flow = p->conductance * (pow(0.5 * (a + b) / p->T_ref, p->exponent) - 1.0) * (b - a);",
+        "q[p->a] += flow;", "q[p->b] -= flow;"), _power),
     "CondensationTerm": Heat(("a", "conductance", "dew_point"), (
         "q[p->a] += N[p->a] < p->dew_point ? p->conductance * (p->dew_point - N[p->a]) : 0.0;",), _condensation),
 }

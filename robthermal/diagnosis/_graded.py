@@ -21,6 +21,7 @@ from .fit import Refit, coarsened, exact
 from .search import SearchState, ShortList, one_place, revise, revised
 
 _SHARE = 0.5  # of the excess mean square, that the set must explain on the training records
+_SMALL = 0.1  # of the mean square beyond the noise that an answer leaves of validation records: more effects leave less
 _NOISE = 2.0  # whitened variance that a finer network must leave, to be all that is missing
 
 
@@ -83,7 +84,9 @@ def graded(judged: Judged, validation: Validation, progress: Progress) -> Judged
             kept = lasting(kept, finer, validation)
         state = _predicting(kept, finer, validation, progress)
         answer = _graded(judged, with_rivals(state, finer, validation), finer, validation)
-        return answer if answer.verdict != "unexplained" else _alone(judged, finer, validation, answer) or answer
+        if answer.verdict == "unexplained":
+            return _alone(judged, finer, validation, answer) or answer
+        return _with_more(judged, answer, finer, validation) or answer
     except (Diverged, InputError):  # a model that runs away is no explanation
         return judged
 
@@ -100,6 +103,21 @@ def _alone(judged: Judged, finer: Refit, validation: Validation, instead: Judged
         return None
     answer = saying_so(_graded(judged, alone, judged.state.nominal, validation), finer)
     return None if instead is not None and answer.verdict == "unexplained" else answer
+
+
+def _with_more(judged: Judged, answer: Judged, finer: Refit, validation: Validation) -> Judged | None:
+    """The answer with more effects than its own, if with the network as it is they leave a small part of what it does.
+
+    A finer network takes over a mass or a lag that is there, and predicts worse without it.
+    """
+    named = {round_.best.candidate.key for round_ in answer.state.rounds}
+    if answer.hold_out is None or not named < {round_.best.candidate.key for round_ in judged.state.rounds}:
+        return None
+    more = _alone(judged, finer, validation, answer)
+    if more is None or more.hold_out is None or not named < {one.best.candidate.key for one in more.state.rounds}:
+        return None
+    rest, less = left(answer.hold_out.gap).rms, left(more.hold_out.gap).rms
+    return more if less**2 < _SMALL * rest**2 else None
 
 
 def chosen_again(state: SearchState, nominal: Refit) -> SearchState:

@@ -11,7 +11,7 @@ from ._drives import Drives
 from ._effect_terms import CondensationTerm, FollowTerm, HeaterTerm, LeadTerm, StepTerm
 from ._module_term import ModuleTerm, RippleTerm
 from ._parts import Link
-from ._terms import Array, Indices, NaturalTerm, RadiationTerm, Term
+from ._terms import Array, Indices, NaturalTerm, PowerTerm, RadiationTerm, Term
 
 if TYPE_CHECKING:
     from ._system import System
@@ -67,6 +67,13 @@ def _links(system: System, index: Index, drives: Drives) -> list[Term]:
     if radiating:
         found.append(RadiationTerm(_names(radiating), *_ends(radiating, index), *_warmer(system, radiating),
                                    np.array([link.radiation for link in radiating], float)))
+    lawful = [(link, link.temperature_law) for link in system.links if link.temperature_law is not None]
+    if lawful:
+        own = [link for link, _ in lawful]
+        found.append(PowerTerm(_names(own), *_ends(own, index), *_warmer(system, own),
+                               np.array([link.conductance for link in own]),
+                               np.array([law.exponent for _, law in lawful]),
+                               np.array([law.reference_temperature for _, law in lawful])))
     stepping = [link for link in system.links if link.step is not None]
     if stepping:
         warmer_a, warmer_b = _warmer(system, stepping)

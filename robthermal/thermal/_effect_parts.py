@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import model_validator
 
-from ._part import Finite, Kelvin, Name, NonNegative, Part, Positive, Share
+from ._part import Exponent, Finite, Kelvin, Name, NonNegative, Part, Positive, Share
 
 
 class Drive(Part):
@@ -136,6 +136,24 @@ class Follow(Part):
 
     column: Name
     relative: NonNegative = 0.0
+
+
+class TemperatureLaw(Part):
+    """A link that follows its own temperature T, the mean of both ends in kelvin.
+
+    Its linear conductance is multiplied by (T / reference_temperature)^exponent.
+
+    Parameters
+    ----------
+    exponent : float
+        Power of the absolute temperature [-], from -10 to 10: about 0.8 for still air, 1 to 3 for fibres and foams
+        that radiate within, below 0 for crystals.
+    reference_temperature : float
+        Temperature at which the link has its conductance [K].
+    """
+
+    exponent: Exponent = 0.0
+    reference_temperature: Kelvin
 
 
 class Lead(Part):

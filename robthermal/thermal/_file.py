@@ -20,7 +20,8 @@ from ._units import celsius_to_kelvin, kelvin_to_celsius
 
 _MAX_BYTES = 200_000_000
 _TEMPERATURES = {"ambients": ("temperature",), "lumps": ("initial", "condensation.dew_point"),
-                 "modules": ("reference_temperature",), "sensors": ("initial",)}
+                 "modules": ("reference_temperature",), "sensors": ("initial",),
+                 "links": ("temperature_law.reference_temperature",)}
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -171,10 +172,13 @@ def _kelvin(data: dict[str, Any], where: str) -> dict[str, Any]:
                          remedy='Write "degC" or "K".')
     for table, keys in _TEMPERATURES.items():
         for key in keys:
-            parts = data.get(table, {})
+            parts = data.get(table)
             if isinstance(parts, dict):
                 data[table] = {name: _part_kelvin(part, key, unit, f"{where} [{table}.{name}] {key}")
                                for name, part in parts.items()}
+            elif isinstance(parts, list):
+                data[table] = [_part_kelvin(part, key, unit, f"{where} [[{table}]] number {number} {key}")
+                               for number, part in enumerate(parts, start=1)]
     if isinstance(data.get("fit"), dict):
         data["fit"] = fit_in_kelvin(data["fit"], unit)
     return data

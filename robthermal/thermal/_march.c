@@ -11,11 +11,12 @@
 
 #include "../_lanes.h"
 
+#define COLDEST 1.0 /* K, as in _terms.py */
 #define PIVOT 1e-2 /* in size, from which a row is divided by it; every diagonal entry is about 1 */
 enum { DEGREE = 5, NODES = DEGREE + 1, ITERATIONS = 20, NUMBERS = 8, MOST = 64, MOST_PORTS = 12, MOST_PAIRS = 64 };
 enum { ROWS = DEGREE * MOST + MOST + 2 * LANES, HEATS = NODES * MOST + LANES };
 #define INLINE inline __attribute__((always_inline))
-enum { MODULE, NATURAL, RADIATION, STEP, FOLLOW, HEATER, LEAD, CONDENSATION }; /* as numbered in _march.py */
+enum { MODULE, NATURAL, RADIATION, STEP, FOLLOW, HEATER, LEAD, CONDENSATION, POWER }; /* as numbered in _march.py */
 
 /* The same fields, in the same order, as `_Problem` of _march.py; matrices row by row. */
 typedef struct {
@@ -36,6 +37,12 @@ typedef struct {
     double *V, *q;                        /* (count, NODES, n_ports + n_w) and (count, NODES, n_q), of every node */
     double *F, *through;                  /* (count, n_free, n_free) and (count, n_free, DEGREE n_ports) */
 } problem;
+
+/* Mean of both ends by the temperature at which a conductance holds. */
+static double power_ratio(const double *p, double total)
+{
+    return fmax(0.5 * (total + p[3] + p[4]), COLDEST) / p[2];
+}
 
 /* Heat into both ends of a pair, as `heat` of the terms in numpy. */
 static void flow(int64_t kind, const double *p, double a, double b, double drive, double *into)
@@ -76,6 +83,10 @@ static void flow(int64_t kind, const double *p, double a, double b, double drive
         into[0] = p[0] * drive * drive;
         into[1] = 0.0;
         return;
+    case POWER:
+        q = p[4] - p[3] - away;
+        q = p[0] * (pow(power_ratio(p, total), p[1]) - 1.0) * q;
+        break;
     default: /* CONDENSATION */
         into[0] = a < p[1] ? p[0] * (p[1] - a) : 0.0;
         into[1] = 0.0;
@@ -130,6 +141,14 @@ static void slopes(int64_t kind, const double *p, double a, double b, double dri
             by[side][2] = share * p[0] * (a - p[1]);
         }
         return;
+    case POWER: {
+        const double ratio = power_ratio(p, a + b), factor = pow(ratio, p[1]);
+        const double bend = 0.5 * p[0] * p[1] * factor / (ratio * p[2]) * (p[4] - p[3] - away);
+        g = p[0] * (factor - 1.0);
+        by[0][0] = bend - g;
+        by[0][1] = bend + g;
+        break;
+    }
     default: /* LEAD, CONDENSATION */
         memset(by, 0, 2 * sizeof(*by));
         by[0][kind == LEAD ? 2 : 0] = kind == LEAD ? 2.0 * p[0] * drive : a < p[1] ? -p[0] : 0.0;

@@ -20,7 +20,7 @@ from ._collocation import DEGREE, TAIL, Step
 from ._effect_terms import CondensationTerm, FollowTerm, HeaterTerm, LeadTerm, StepTerm
 from ._module_term import ModuleTerm, RippleTerm
 from ._ports import PortHeat
-from ._terms import Array, NaturalTerm, RadiationTerm
+from ._terms import Array, NaturalTerm, PowerTerm, RadiationTerm
 
 SOURCE, HEADERS = Path(__file__).with_name("_march.c"), ("../_lanes.h",)
 _MOST, _MOST_PORTS, _MOST_PAIRS, _NUMBERS, _BEYOND = 64, 12, 64, 8, 8  # as in the source
@@ -263,4 +263,5 @@ _KINDS: dict[type, tuple[int, Callable[[Any], tuple[Array | float, ...]]]] = {  
     HeaterTerm: (5, lambda t: (t.gain * t.slope, t.T_ref, t.share)),
     LeadTerm: (6, lambda t: (t.resistance,)),
     CondensationTerm: (7, lambda t: (t.conductance, t.dew_point)),
+    PowerTerm: (8, lambda t: (t.conductance, t.exponent, t.T_ref, t.warmer_a, t.warmer_b)),
 }

@@ -150,6 +150,10 @@ def _link(system: System, text: Text, link: Link, heats: dict[str, list[str]]) -
         if link.follow:
             growth = text.parameter(f"follow_{link.name}", link.follow.relative)
             changes.append(f"{growth} * abs({_driven(text, link.follow.column)})")
+        if link.temperature_law:
+            exponent = text.parameter(f"law_{link.name}", link.temperature_law.exponent, "1")
+            at = text.parameter(f"law_temperature_{link.name}", link.temperature_law.reference_temperature, "K")
+            changes.append(f"((({a} + {b}) / (2 * {at}))^{exponent} - 1)")
         if changes:
             conductance += f" * (1 + {' + '.join(changes)})"
         flows.append(f"{conductance} * ({a} - {b})")

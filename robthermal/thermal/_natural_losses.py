@@ -30,7 +30,7 @@ def constant_losses(system: System) -> tuple[str, ...]:
     """
     return tuple(link.name for link in system.links
                  if link.conductance > 0 and any(end in system.ambients for end in link.between)
-                 and not (link.natural or link.radiation or link.step or link.follow))
+                 and not (link.natural or link.radiation or link.step or link.follow or link.temperature_law))
 
 
 def natural_losses(system: System, links: Collection[str] | None = None, *, exponent: float = 0.25) -> System:

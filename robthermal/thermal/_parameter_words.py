@@ -26,7 +26,9 @@ WORDS: dict[str, dict[str, tuple[str, str]]] = {  # by table and key: words and 
         "radiation": ("radiation along link {0}", "W/K⁴"),
         "step.relative": ("relative step of the conductance of link {0}", "-"),
         "step.time": ("time of the step of link {0}", "s"),
-        "follow.relative": ("growth of the conductance of link {0} with the column it follows", "1/unit")},
+        "follow.relative": ("growth of the conductance of link {0} with the column it follows", "1/unit"),
+        "temperature_law.exponent": ("exponent of the temperature in the conductance of link {0}", "-"),
+        "temperature_law.reference_temperature": ("reference temperature of link {0}", "K")},
     "inputs": {"gain": ("gain of {0}", "W per unit"), **_DRIVE, "power_slope": ("slope of the power of {0}", "1/K"),
                "feedthrough.share": ("share of {0} in another lump", "-")},
     "modules": {

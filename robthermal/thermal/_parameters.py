@@ -23,7 +23,7 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "lumps": ("capacity", "disturbance", "initial", "heat", "gradient", "periodic.heat", "periodic.period",
               "periodic.phase", "condensation.conductance", "condensation.dew_point"),
     "links": ("conductance", "natural.gain", "natural.exponent", "radiation", "step.relative", "step.time",
-              "follow.relative"),
+              "follow.relative", "temperature_law.exponent", "temperature_law.reference_temperature"),
     "inputs": ("gain", *_DRIVE, "drive.before", "power_slope", "feedthrough.share"),
     "modules": (*_LINEAR, "reference_temperature", "thomson", "joule_split", "hysteresis.heat",
                 "hysteresis.time_constant", *_DRIVE, "drive.before"),
@@ -65,7 +65,7 @@ def _numbers(table: str, name: str, part: Part) -> tuple[tuple[str, float], ...]
 
 EFFECT_SIZES = {  # zero or absent: the effect is not there
     "lumps": ("heat", "gradient", "periodic.heat", "condensation.conductance"),
-    "links": ("step.relative", "follow.relative"),
+    "links": ("step.relative", "follow.relative", "temperature_law.exponent"),
     "inputs": (*_DRIVE, "power_slope", "feedthrough.share"), "leads": ("resistance",), "flows": ("conductance",),
     "sensors": ("self_heating",),
     "modules": ("thomson", "joule_split", "hysteresis.heat", *_DRIVE)}

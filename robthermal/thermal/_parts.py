@@ -15,6 +15,7 @@ from ._effect_parts import Hysteresis as Hysteresis
 from ._effect_parts import Lead as Lead
 from ._effect_parts import Periodic as Periodic
 from ._effect_parts import Step as Step
+from ._effect_parts import TemperatureLaw as TemperatureLaw
 from ._part import Finite, Kelvin, NonNegative, Positive, Range, ordered
 from ._part import Name as Name
 from ._part import Part as Part
@@ -123,6 +124,8 @@ class Link(Part):
         Sudden change of the linear part.
     follow : Follow, optional
         Dependence of the linear part on a current, or on a recorded force or fan speed.
+    temperature_law : TemperatureLaw, optional
+        Dependence of the linear part on the temperature of the link; of several such changes, each adds to the others.
     name : str
         Name of the link; default "a-b".
     """
@@ -133,6 +136,7 @@ class Link(Part):
     radiation: NonNegative | None = None
     step: Step | None = None
     follow: Follow | None = None
+    temperature_law: TemperatureLaw | None = None
     name: str = ""
 
     @model_validator(mode="after")

@@ -30,13 +30,15 @@ from ._parts import (
     Periodic,
     Sensor,
     Step,
+    TemperatureLaw,
 )
 
 _PARTS: dict[str, type[Part]] = {"ambients": Ambient, "lumps": Lump, "links": Link, "inputs": Input,
                                  "modules": Module, "leads": Lead, "flows": Flow, "sensors": Sensor, "fit": FitRange}
 _INNER: dict[str, type[Part]] = {"natural": Natural, "seebeck": Linear, "resistance": Linear, "conductance": Linear,
                                  "drive": Drive, "hysteresis": Hysteresis, "periodic": Periodic, "step": Step,
-                                 "condensation": Condensation, "feedthrough": Feedthrough, "follow": Follow}
+                                 "condensation": Condensation, "feedthrough": Feedthrough, "follow": Follow,
+                                 "temperature_law": TemperatureLaw}
 _TOP = ("system", "ambients", "lumps", "links", "inputs", "modules", "leads", "flows", "sensors", "fit")
 
 _LISTED = 5  # further places in a message

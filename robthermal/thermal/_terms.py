@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.floating]
 Indices = NDArray[np.intp]
+COLDEST = 1.0  # K; an iteration that passes below has not converged, and a power of less than nothing is no number
 
 
 @dataclass(frozen=True)
@@ -152,6 +153,52 @@ class RadiationTerm(LinkTerm):
     def parameter_slopes(self, field: str, Ta: Array, Tb: Array, drive: Array) -> tuple[Array, Array]:
         """Derivative with respect to ``radiation``."""
         flow = (Tb + self.warmer_b) ** 4 - (Ta + self.warmer_a) ** 4
+        return flow, -flow
+
+
+@dataclass(frozen=True)
+class PowerTerm(LinkTerm):
+    """What a conductance gains with its temperature: conductance ((T / T_ref)^exponent - 1) (T_b - T_a).
+
+    T is the mean of both ends.
+    """
+
+    fields: ClassVar[tuple[str, ...]] = ("conductance", "temperature_law.exponent",
+                                         "temperature_law.reference_temperature")
+
+    conductance: Array
+    exponent: Array
+    T_ref: Array
+
+    def _ratio(self, Ta: Array, Tb: Array) -> Array:
+        mean = 0.5 * (Ta + Tb + self.warmer_a + self.warmer_b)
+        return np.where(mean.real > COLDEST, mean, COLDEST) / self.T_ref
+
+    def _difference(self, Ta: Array, Tb: Array) -> Array:
+        return Tb - Ta + (self.warmer_b - self.warmer_a)
+
+    def heat(self, Ta: Array, Tb: Array, drive: Array) -> tuple[Array, Array]:
+        """Heat into a and b [W]."""
+        flow = self.conductance * (self._ratio(Ta, Tb) ** self.exponent - 1) * self._difference(Ta, Tb)
+        return flow, -flow
+
+    def slopes(self, Ta: Array, Tb: Array, drive: Array) -> Slopes:
+        """The conductance gained, and its change with the mean."""
+        ratio = self._ratio(Ta, Tb)
+        factor = ratio ** self.exponent
+        gained = self.conductance * (factor - 1)
+        bend = 0.5 * self.conductance * self.exponent * factor / (ratio * self.T_ref) * self._difference(Ta, Tb)
+        zero = np.zeros_like(gained)
+        return Slopes(aa=bend - gained, ab=bend + gained, ba=gained - bend, bb=-gained - bend, a_drive=zero,
+                      b_drive=zero)
+
+    def parameter_slopes(self, field: str, Ta: Array, Tb: Array, drive: Array) -> tuple[Array, Array]:
+        """Derivatives with respect to `fields`."""
+        ratio = self._ratio(Ta, Tb)
+        factor = ratio ** self.exponent
+        by = {"conductance": factor - 1, "temperature_law.exponent": self.conductance * factor * np.log(ratio),
+              "temperature_law.reference_temperature": -self.conductance * factor * self.exponent / self.T_ref}
+        flow = by[field] * self._difference(Ta, Tb)
         return flow, -flow
 
 

@@ -14,8 +14,8 @@ from ._numbers import exact, name_of, show
 
 Interval = tuple[fmpq, fmpq]
 # effects of a system file beyond the plain network: claims that do not know them refuse these names
-_EFFECTS = ("leads", "heat", "gradient", "periodic", "condensation", "step", "follow", "thomson", "joule_split",
-            "hysteresis", "drive", "power_slope", "feedthrough", "self_heating", "flows")
+_EFFECTS = ("leads", "heat", "gradient", "periodic", "condensation", "step", "follow", "temperature_law", "thomson",
+            "joule_split", "hysteresis", "drive", "power_slope", "feedthrough", "self_heating", "flows")
 
 
 def get(table: Mapping[str, Any], key: str, where: str) -> Any:

@@ -90,6 +90,19 @@ def test_an_effect_of_size_zero_is_no_effect():
     assert rt.certify.contraction(system, current=CURRENT, temperature=BOX).holds
 
 
+def test_no_range_lets_a_temperature_law_into_a_claim():
+    first, *others = machine().links
+    link = rt.thermal.Link(between=first.between, conductance=first.conductance,
+                           temperature_law={"exponent": 0.0, "reference_temperature": 298.15})
+    system = machine().model_copy(update={"links": (link, *others)})
+    assert rt.certify.contraction(system, current=CURRENT, temperature=BOX).holds
+    name = f"links.{link.name}.temperature_law.exponent"
+    with pytest.raises(rt.InputError, match=name):
+        rt.certify.contraction(system, current=CURRENT, temperature=BOX, parameters={name: (0.0, 0.5)})
+    with pytest.raises(rt.InputError, match=name):
+        rt.certify.contraction(system.with_parameters({name: 0.5}), current=CURRENT, temperature=BOX)
+
+
 def test_the_law_refuses_modules_it_does_not_know():
     system = rt.systems.two_module().with_parameters({"modules.m1.thomson": 1e-3})
     with pytest.raises(rt.InputError, match=r"modules\.m1\.thomson"):

@@ -30,6 +30,7 @@ EFFECTS = [("lead_heating", ["x6", "m1"], {"resistance": 0.05}), ("thomson", ["m
            ("heater_power_slope", ["heater"], {"slope": 1e-3}), ("input_feedthrough", ["heater", "x5"], {"share": 0.1}),
            ("periodic_load", ["x2"], {"heat": 0.3}), ("conductance_step", ["x1-x3"], {"relative": 0.3, "time": 9.0}),
            ("driven_conductance", ["x2-x4", "m1"], {"relative": 0.2}),
+           ("conductance_exponent", ["x1-room"], {"exponent": 1.2}),
            ("input_gain_slope", ["heater"], {"slope": 0.01})]
 
 

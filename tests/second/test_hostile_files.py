@@ -41,6 +41,7 @@ def test_the_good_one_is_valid(good):
     ('"capacity": 10.0', '"capacity": "0x1p5000"'), ('"capacity": 10.0', '"capacity": -10.0'),
     ('"capacity": 10.0', '"capacity": 10.0, "capacity": 10.0'), ('"capacity": 10.0', '"capacity": [10.0]'),
     ('"capacity": 10.0', '"capacity": 10.0, "thomson": 1'), ('"capacity": 10.0', '"capacity": 10.0, "follow": {}'),
+    ('"capacity": 10.0', '"capacity": 10.0, "temperature_law": {}'),
     ('"rate": 0.04', '"rate": 0.06'),
     ('"rate": 0.04', '"rate": -0.04'), ('"method": "energy"', '"method": "hope"'),
     ('"method": "energy"', '"method": "sum"'), ('"robthermal-certificate/1"', '"robthermal-certificate/2"'),

@@ -13,9 +13,9 @@ import robthermal as rt
 
 ORDER = """seebeck_slope resistance_slope conductance_slope thomson joule_split hysteresis lead_heating missing_link
     missing_ambient_link coolant_warming natural_convection radiation conductance_step driven_conductance
-    heat_source ambient_gradient hidden_mass path_mass periodic_load condensation input_gain input_offset
-    input_saturation input_gain_slope input_delay input_lag heater_power_slope input_feedthrough driven_heat
-    sensor_lag sensor_offset sensor_gain sensor_self_heating""".split()
+    conductance_exponent heat_source ambient_gradient hidden_mass path_mass periodic_load condensation input_gain
+    input_offset input_saturation input_gain_slope input_delay input_lag heater_power_slope input_feedthrough
+    driven_heat sensor_lag sensor_offset sensor_gain sensor_self_heating""".split()
 KINDS = {"module", "lump", "ambient", "link", "sensor", "input", "input or module", "lump or ambient"}
 TOY = '''"""A fan that blows on a lump while its heater is on."""
 

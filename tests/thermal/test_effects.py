@@ -61,6 +61,7 @@ CASES = [
     ("conductance_step", ["plate-cold"], {"relative": -0.4, "time": 130.0}),
     ("driven_conductance", ["plate-cold", "m"], {"relative": 0.4}), ("driven_heat", ["v", "cold"], {"gain": 0.2}),
     ("condensation", ["cold"], {"conductance": 0.5, "dew_point": 296.2}),
+    ("conductance_exponent", ["plate-cold"], {"exponent": -1.4}),
 ]
 IDS = [f"{effect} {where[0]}" for effect, where, _ in CASES]
 
@@ -141,6 +142,7 @@ def truth(effect: str, where: list, p: dict, run: rt.Record) -> np.ndarray:
         through = p["share"] * heat if is_("input_feedthrough") else 0.0
         g = 1.5 * (1 + p["relative"] * (wall >= p["time"]) if is_("conductance_step") else 1.0)
         g *= 1 + p["relative"] * abs(current) if is_("driven_conductance") else 1.0
+        g *= (0.5 * (plate + cold) / T0) ** p["exponent"] if is_("conductance_exponent") else 1.0
         taken = 0.5 * p["coefficient"] * current * (hot - cold) if is_("thomson") else 0.0
         moved = p["split"] * R * current**2 if is_("joule_split") else 0.0
         into = {"plate": g * (cold - plate) + 0.06 * (warm - plate) + heat - through,

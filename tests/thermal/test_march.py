@@ -18,6 +18,7 @@ from robthermal.thermal import _exponential, _march
 
 PARTS = [("conductance_step", ["plate-hot"], {"relative": -0.3, "time": 40.5}),
          ("driven_conductance", ["cold-sample", "tem"], {"relative": 0.2}),
+         ("conductance_exponent", ["sample-room"], {"exponent": 1.7}),
          ("condensation", ["cold"], {"conductance": 0.01, "dew_point": 330.0}),
          ("lead_heating", ["hot", "tem"], {"resistance": 0.2}),
          ("heater_power_slope", ["heater"], {"slope": 0.004}), ("thomson", ["tem"], {"coefficient": 2e-4}),

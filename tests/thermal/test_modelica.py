@@ -22,7 +22,8 @@ EFFECTS = {
     "input_feedthrough": (["heater", "plate"], {"share": 0.3}), "ambient_gradient": (["sample"], {"difference": 4.0}),
     "periodic_load": (["sample"], {"heat": 1.0, "period": 9.0, "phase": 0.4}),
     "conductance_step": (["plate-hot"], {"relative": -0.6, "time": 5.0}),
-    "driven_conductance": (["plate-hot", "tem"], {"relative": 0.4}), "input_gain_slope": (["heater"], {"slope": 0.05}),
+    "driven_conductance": (["plate-hot", "tem"], {"relative": 0.4}),
+    "conductance_exponent": (["plate-hot"], {"exponent": -1.5}), "input_gain_slope": (["heater"], {"slope": 0.05}),
     "condensation": (["cold"], {"conductance": 0.5, "dew_point": 296.0}), "sensor_lag": (["T_plate"],
                                                                                        {"time_constant": 2.0}),
     "sensor_offset": (["T_plate"], {"offset": 0.5}), "sensor_gain": (["T_plate"], {"gain": 1.1}),
@@ -58,7 +59,8 @@ GROUPS = [[], ["thomson", "seebeck_slope", "heat_source", "sensor_lag"], ["joule
           ["natural_convection", "input_delay", "resistance_slope", "sensor_offset"],
           ["hidden_mass", "input_lag", "conductance_step", "conductance_slope"],
           ["sensor_self_heating", "heater_power_slope", "input_feedthrough", "ambient_gradient"],
-          ["periodic_load", "condensation", "driven_conductance", "input_gain_slope"]]
+          ["periodic_load", "condensation", "driven_conductance", "input_gain_slope"],
+          ["conductance_exponent", "natural_convection"]]
 
 
 @pytest.mark.parametrize("effects", GROUPS, ids="-".join)
@@ -112,7 +114,7 @@ def test_all_effects_at_once(full, drive):
     system = full.with_parameters({"sensors.T_sample.delay": 2.0})
     for effect in ("thomson", "hysteresis", "lead_heating", "input_saturation", "input_delay", "input_lag",
                    "heater_power_slope", "input_feedthrough", "ambient_gradient", "condensation", "periodic_load",
-                   "conductance_step", "driven_conductance"):
+                   "conductance_step", "driven_conductance", "conductance_exponent"):
         system = rt.thermal.add_effect(system, effect, *EFFECTS[effect]).system
     system = rt.thermal.add_effect(system, "input_lag", ["tem"], {"time_constant": 2.0}).system
     compare(system, drive(n=8, seed=4), 5e-4)

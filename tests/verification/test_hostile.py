@@ -31,6 +31,7 @@ def contraction(system, region=None, method="energy", **evidence):
 @pytest.mark.parametrize(("place", "key", "value"), [
     (("modules", "m"), "thomson", 5.0), (("modules", "m"), "joule_split", 0.3), (("modules", "m"), "drive", {}),
     (("modules", "m"), "hysteresis", {}), (("links", 0), "step", {}), (("links", 0), "follow", {}),
+    (("links", 0), "temperature_law", {}),
     (("lumps", "a"), "condensation", {}),
     (("lumps", "a"), "heat", 1.0), (("lumps", "a"), "gradient", 1.0), ((), "leads", [])])
 def test_effects_that_no_claim_takes_into_account_are_refused(place, key, value):

@@ -15,7 +15,8 @@ others did up to 0.78, and once 0.91.
 
 Natural convection and radiation of one path differ little over tens of kelvins. Beside a finer network that leaves no
 misfit the right one is found; where it leaves one, the other stands beside it. A simulated mirror in vacuum, whose
-network has four lumps, had natural convection as a name of its own.
+network has four lumps, had natural convection as a name of its own. So it is with a conductance that grows with its
+temperature: beside it stands radiation between the same two nodes, and the reverse.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from ._short_list import Entry, Key, delta_bic, refit_short_list
 
 _OFFSET = "sensor_offset"
 _INSTEAD = ("heat_source", "input_feedthrough", "sensor_gain")  # the last part of their place is where they act
-_LAWS = {"natural_convection": "radiation", "radiation": "natural_convection"}
+_LAWS = ("natural_convection", "radiation", "conductance_exponent")  # of the heat between two nodes
 _MISFIT = 2.0  # whitened variance, as that which a finer network leaves, to explain nothing away
 _AS_WELL = 0.95  # of what the effect does to the sum of squares in the network as it is
 
@@ -85,7 +86,7 @@ def heats_instead(round_: Accepted, fit: Refit, less: Refit, names: Sequence[str
 
 
 def other_laws(round_: Accepted, fit: Refit, less: Refit, names: Sequence[str] | None) -> list[Entry]:
-    """Radiation for natural convection along the same path, or the reverse, if it does nearly as much, refitted.
+    """Other laws of the heat between the same two nodes, if they do nearly as much, refitted.
 
     Where the fit leaves no misfit even a small difference between the two is seen, and none is asked.
 
@@ -100,13 +101,23 @@ def other_laws(round_: Accepted, fit: Refit, less: Refit, names: Sequence[str] |
     names : sequence of str or None
         Effects that may be named; None for the whole catalog.
     """
-    best = round_.best.candidate
-    other = _LAWS.get(best.effect.name)
-    if other is None or fit.variance < _MISFIT or (names is not None and other not in names):
+    best, system = round_.best.candidate, less.structure.base
+    if best.effect.name not in _LAWS:
         return []
-    known = _known(round_, fit)
-    return _as_well(best, [one for one in less.testable(candidates(less.structure.base, [other]))
-                           if one.where == best.where and one.key not in known], less)
+    seen = _LAWS[:2] if fit.variance < _MISFIT else ()
+    others = [law for law in _LAWS if law != best.effect.name and (names is None or law in names)
+              and not {law, best.effect.name} <= {*seen}]
+    if not others:
+        return []
+    known, nodes = _known(round_, fit), _nodes(best, system)
+    return _as_well(best, [one for one in less.testable(candidates(system, others))
+                           if _nodes(one, system) == nodes and one.key not in known], less)
+
+
+def _nodes(candidate: Candidate, system: System) -> frozenset[str]:
+    """The two nodes between which an effect acts, by themselves or by their link."""
+    joined = (link.between for link in system.links if candidate.where == (link.name,))
+    return frozenset(next(joined, candidate.where))
 
 
 def _as_well(best: Candidate, others: Sequence[Candidate], less: Refit) -> list[Entry]:
@@ -116,8 +127,17 @@ def _as_well(best: Candidate, others: Sequence[Candidate], less: Refit) -> list[
     if not own:  # nothing to compare with
         return []
     least = plain.rss - _AS_WELL * (plain.rss - min(own))
-    return [entry for one in others if any(found.fit.rss < least for found in _refitted(one, plain))
-            for entry in _refitted(one, less)]
+    found = [(one, entry) for one in others for entry in _refitted(one, plain)[:1] if entry.fit.rss < least]
+    return [entry for one, alone in found for entry in _refitted(one, less) or _from(alone, less)]
+
+
+def _from(alone: Entry, less: Refit) -> list[Entry]:
+    """An effect beside a finer network that has explained it away, from where it was found without one."""
+    try:
+        fit = refitted_from(less, alone.candidate, less, alone.found)
+    except (Diverged, InputError):
+        return []
+    return [Entry(alone.candidate, fit, delta_bic(less, fit), alone.p_value)]
 
 
 def _off(round_: Accepted, system: System) -> bool:

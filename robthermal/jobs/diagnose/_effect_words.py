@@ -10,6 +10,7 @@ WORDS = {  # {0}, {1}: the parts it acts on, in the order of the catalog
     "ambient_drift": "a swing or drift of {0}, which was not recorded",
     "ambient_gradient": "an ambient at {0} that is warmer or colder than the measured one",
     "condensation": "condensation on {0}",
+    "conductance_exponent": "a dependence of the conductance {0} on its temperature",
     "conductance_slope": "the slope of the conductance of {0} over temperature",
     "conductance_step": "a change of the conductance {0} during the record",
     "coolant_warming": "the warming of {0} at the lumps that it passes",

@@ -34,7 +34,7 @@ def _share(values: Values) -> float:
 
 def _conducts(system: System, link: Link) -> bool:
     """Whether it joins a lump to an ambient, and by conduction alone."""
-    plain = all(getattr(link, what) is None for what in ("natural", "radiation", "step", "follow"))
+    plain = all(getattr(link, what) is None for what in ("natural", "radiation", "step", "follow", "temperature_law"))
     return link.conductance > 0 and plain and not set(link.between) <= set(system.lumps)
 
 
