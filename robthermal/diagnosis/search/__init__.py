@@ -16,8 +16,8 @@ from ._neighbors import MASSES as MASSES
 from ._neighbors import one_place as one_place
 from ._neighbors import with_neighbors as with_neighbors
 from ._other_end import with_other_end as with_other_end
+from ._other_law import other_laws as other_laws
 from ._other_thermometer import heats_instead as heats_instead
-from ._other_thermometer import other_laws as other_laws
 from ._other_thermometer import other_thermometers as other_thermometers
 from ._periods import between_trials as between_trials
 from ._periods import other_periods as other_periods
