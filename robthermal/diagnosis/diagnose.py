@@ -38,6 +38,7 @@ from ._either_way import either_way, either_way_in_words
 from ._finer_network import unless_finer
 from ._found import Found
 from ._graded import graded, lasting_beyond_steps
+from ._held_room import asks_for_a_held_room, unless_worse
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise, without_names_of_noise
 from ._lasting import evidence_of
 from ._late_commands import late_by_rows
@@ -71,7 +72,6 @@ from .fit import Refit, SessionGain, exact, found_ambients, lag_name, only_heate
 from .plan import NextExperiment, next_experiment, resolving, rivals, trial_conditions
 from .search import Accepted, SearchState, quantities_of
 
-_TOO_WARM = 1.0  # K above what the readings allow: a room beside which no name stays
 
 @threadpool_limits.wrap(limits=1, user_api="blas")  # products are small: threads only wait for each other
 def diagnose(system: System, records: Measured | Sequence[Measured], *,
@@ -171,9 +171,9 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
                     session_gain=session_gain)
     refuse_constant(nominal.system, [path.one for path in nominal.records])
     judged = _judged(nominal, names, checked, progress)
-    if too_warm(nominal) and _asks_for_a_warm_room(judged):
+    if too_warm(nominal) and asks_for_a_held_room(judged):
         progress("once more, with a room no warmer than beside a machine that is only heated")
-        judged = _judged(only_heated(nominal), names, checked, progress)
+        judged = unless_worse(judged, _judged(only_heated(nominal), names, checked, progress))
     held = only_heated if judged.state.nominal.structure.only_heated else replace
     judged = asked_of_log(judged, lambda others: held(refit(system, others, floor, parameters=parameters,
                                                             session_gain=session_gain, near=nominal)), checked)
@@ -240,17 +240,6 @@ def _judged(nominal: Refit, names: tuple[str, ...] | None, validation: Validatio
     judged = lasting_beyond_steps(judge(searched(nominal, names, validation, progress), validation, progress))
     judged = unless_finer(judged)
     return predicting_best(graded(reconsider_noise(judged, validation), validation, progress), validation)
-
-
-def _asks_for_a_warm_room(judged: Judged) -> bool:
-    """Whether an answer does not explain the records down to the noise, or only with a room too warm for the machine.
-
-    Where the room comes out cool enough beside the effects named, holding it below the readings would change nothing.
-    Where nothing is missing the machine may have been brought in from the cold.
-    """
-    if judged.verdict in ("unexplained", "consistent"):
-        return judged.verdict == "unexplained"
-    return too_warm(judged.plain or judged.state.fit, _TOO_WARM)
 
 
 def concluded(judged: Judged, trained: str = "training records") -> Diagnosis:

@@ -103,6 +103,7 @@ def test_from_the_system_file_and_the_command_line(tmp_path: Path) -> None:
     ({"m1": {"constant": float("nan")}}, "constant = 'nan'"),
     ({"m1": {"constant": 1.0, "unit": "W"}}, r"the current 'm1' is in \[W\]"),
     ({"m2": {"constant": 1.0}}, "no name of the system"),
+    ({"Strom [A]": "m1"}, r"""no name of the system.*The name of the system comes first: m1 = "Strom \[A\]"\."""),
 ])
 def test_what_is_no_constant(tmp_path: Path, choice: Mapping[str, Any], words: str) -> None:
     with pytest.raises(rt.InputError, match=words):

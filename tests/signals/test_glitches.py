@@ -86,3 +86,26 @@ def test_reader_says_and_keeps_them_unless_a_filter_is_asked_for(tmp_path: Path)
         cleaned = rt.read_record(path, inputs=["u"], outputs=["T1"], median_filter=5.0)
     assert np.abs(cleaned["T1"] - np.round(heating(200), 1)).max() < 0.3
     assert any("running median" in note for note in cleaned.notes)
+
+
+def log_of_a_fan(folder: Path, rpm: np.ndarray) -> Path:
+    rows = [f"{2 * k},{value:g},{30 + 0.01 * k:.2f}" for k, value in enumerate(rpm)]
+    path = folder / "fan.csv"
+    path.write_text("\n".join(["time [s],fan [rpm],T [°C]", *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+def test_a_fan_that_turns_999_times_a_minute_is_no_fault_code(tmp_path: Path) -> None:
+    """Its readings scatter by 20 around 1000: the log was refused for the first one of 999."""
+    rpm = 1000.0 + np.round(np.random.default_rng(3).normal(0.0, 20.0, 400))
+    rpm[::40] = 999.0
+    record = rt.read_record(log_of_a_fan(tmp_path, rpm), inputs=["fan"], outputs=["T"])
+    np.testing.assert_array_equal(record["fan"], rpm)
+
+
+@pytest.mark.parametrize("code", [999.0, -127.0, 9999.0])
+def test_a_code_beyond_all_other_values_is(tmp_path: Path, code: float) -> None:
+    rpm = 700.0 + np.round(np.random.default_rng(3).normal(0.0, 20.0, 400))
+    rpm[[100, 200]] = code
+    with pytest.raises(InputError, match=rf"{code:g} jumps there and back, like a fault code \(2 such cells\)"):
+        rt.read_record(log_of_a_fan(tmp_path, rpm), inputs=["fan"], outputs=["T"])

@@ -151,6 +151,8 @@ def _number(table: Table, line: int, header: str, text: str) -> float:
 def refuse_codes(table: Table, header: str, raw: Array, declared: ImportOptions, temperature: bool) -> None:
     """Refuse rows that jump to a known fault code and back; 85.0 is only said.
 
+    In a column of no temperatures a code lies beyond all other values.
+
     Parameters
     ----------
     table : Table
@@ -173,6 +175,8 @@ def refuse_codes(table: Table, header: str, raw: Array, declared: ImportOptions,
     index = np.flatnonzero(np.isfinite(raw))
     values = raw[index]
     for code in doubted if len(values) > 2 else ():
+        if not temperature and _within(values, code):
+            continue
         hit = values == code
         start, stop = _jump(values, hit, code, temperature and code != _DOUBTED)
         if stop <= start:
@@ -188,6 +192,12 @@ def refuse_codes(table: Table, header: str, raw: Array, declared: ImportOptions,
         text = f"{header!r} reads exactly 85.0 in single rows: a DS18B20 after power-up? "
         text += "missing = [85.0] takes it as missing"
         table.actions.append(Action("glitches", stop - start, text, header, [table.lines[int(index[start])]]))
+
+
+def _within(values: Array, code: float) -> bool:
+    """Whether a code lies between the other values, as 999 rpm of a fan does: then it is one of them."""
+    others = values[~np.isin(values, _CODES)]
+    return bool(others.size and others.min() < code < others.max())
 
 
 def _jump(values: Array, hit: NDArray[np.bool_], code: float, may_stay: bool) -> tuple[int, int]:

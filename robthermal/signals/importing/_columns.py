@@ -63,12 +63,13 @@ def channels_of_system(table: Table, system: SystemLike, choice: Declared, time:
         **dict.fromkeys(system.ambient_names, "ambient"),
         **{name: "voltage" if volts.get(name) == "V" else "sensor" for name in system.sensor_names},
     }
-    for name in choice.columns:
+    for name, picked in choice.columns.items():
         if name not in roles:
+            swapped = picked.column in roles and f'The name of the system comes first: {picked.column} = "{name}".'
             raise InputError(
                 f"columns has {name!r}, which is no name of the system",
                 where=table.where,
-                remedy=suggestion(name, tuple(roles)),
+                remedy=swapped or suggestion(name, tuple(roles)),
             )
     units = dict(getattr(system, "input_units", {}))
     gains = dict(getattr(system, "input_gains", {}))
