@@ -112,10 +112,10 @@ def _with_more(judged: Judged, answer: Judged, finer: Refit, validation: Validat
     A finer network takes over a mass or a lag that is there, and without it another day is not predicted. Where most of
     that day's gap is closed the answer stays: what is coarse in a network looks like a mass and a gain, too.
     """
-    named = {round_.best.candidate.key for round_ in answer.state.rounds}
-    if answer.hold_out is None or not named < {round_.best.candidate.key for round_ in judged.state.rounds}:
+    if answer.hold_out is None or left(answer.hold_out.gap).share_explained > _MOST:
         return None
-    if left(answer.hold_out.gap).share_explained > _MOST:
+    named = {round_.best.candidate.key for round_ in answer.state.rounds}
+    if not named < {round_.best.candidate.key for round_ in judged.state.rounds}:
         return None
     more = _alone(judged, finer, validation, answer)
     if more is None or more.hold_out is None or not named < {one.best.candidate.key for one in more.state.rounds}:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ._judge import Judged
-from .fit import too_warm
+from .fit import Refit, only_heated, too_warm
 
 _TOO_WARM = 1.0  # K above what the readings allow: a room beside which no name stays
 
@@ -35,3 +35,16 @@ def unless_worse(free: Judged, held: Judged) -> Judged:
     if free.verdict != "unexplained" or held.verdict != "unexplained" or not (free.hold_out and held.hold_out):
         return held
     return free if free.hold_out.gap.after < held.hold_out.gap.after else held
+
+
+def held_alike(judged: Judged, fit: Refit) -> Refit:
+    """A fit to other records, with the room held below the coolest readings where it is in an answer.
+
+    Parameters
+    ----------
+    judged : Judged
+        Answer with the room free or held.
+    fit : Refit
+        Of the nominal system, with the room free.
+    """
+    return only_heated(fit) if judged.state.nominal.structure.only_heated else fit

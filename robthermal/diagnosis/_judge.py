@@ -82,6 +82,8 @@ class Judged:
         How else the log may be read, as means or with commands in another row; empty where that explains nothing.
     finer : str
         That a finer network explains the records as well as the one effect named; empty where it does not.
+    room : str
+        How ambients that were not recorded are taken to wander; empty where they stand still.
     """
 
     state: SearchState
@@ -97,6 +99,7 @@ class Judged:
     compared: bool = False
     means: str = ""
     finer: str = ""
+    room: str = ""
 
     def __str__(self) -> str:
         return "\n".join([str(self.state), *map(str, [self.adequacy, self.hold_out] if self.hold_out else

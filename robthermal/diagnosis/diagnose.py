@@ -38,7 +38,7 @@ from ._either_way import either_way, either_way_in_words
 from ._finer_network import unless_finer
 from ._found import Found
 from ._graded import graded, lasting_beyond_steps
-from ._held_room import asks_for_a_held_room, unless_worse
+from ._held_room import asks_for_a_held_room, held_alike, unless_worse
 from ._judge import Judged, Name, Progress, Validation, alternatives, judge, reconsider_noise, without_names_of_noise
 from ._lasting import evidence_of
 from ._late_commands import late_by_rows
@@ -50,6 +50,7 @@ from ._refine import refine as refined
 from ._searching import searched
 from ._steep_power import falling_powers, steep_powers
 from ._visible_words import visible_in_words
+from ._wandering_room import beside_a_wandering_room
 from ._with_names import ranged
 from ._wrong_columns import asked_of_columns
 from .change import NAME, relative
@@ -170,13 +171,9 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
     nominal = refit(system, records, floor, parameters=parameters, operating_point=operating_point,
                     session_gain=session_gain)
     refuse_constant(nominal.system, [path.one for path in nominal.records])
-    judged = _judged(nominal, names, checked, progress)
-    if too_warm(nominal) and asks_for_a_held_room(judged):
-        progress("once more, with a room no warmer than beside a machine that is only heated")
-        judged = unless_worse(judged, _judged(only_heated(nominal), names, checked, progress))
-    held = only_heated if judged.state.nominal.structure.only_heated else replace
-    judged = asked_of_log(judged, lambda others: held(refit(system, others, floor, parameters=parameters,
-                                                            session_gain=session_gain, near=nominal)), checked)
+    judged, moved = _answers(nominal, names, checked, progress)
+    judged = asked_of_log(judged, lambda others: held_alike(judged, refit(
+        system, others, floor, parameters=parameters, session_gain=session_gain, near=nominal)), checked)
     judged = asked_of_columns(judged, system, floor.noise, lambda others: refit(
         system, others, floor, parameters=parameters, session_gain=session_gain))
     progress("locating the misfit and planning the next experiment")
@@ -192,7 +189,7 @@ def diagnose(system: System, records: Measured | Sequence[Measured], *,
             alone=lambda: again(system, first, validation=others, session_gain=session_gain))
         if len(found.nominal.records) == 1:
             fitted_to, held_out = first, others
-    found = rows.left_out_beside(found)
+    found = rows.left_out_beside(_unless_it_wanders(found, moved))
     if not refine or rows.replaced:
         return found
     progress("splitting the lump in which the remainder sits")
@@ -233,6 +230,23 @@ def _listed(data: Measured | Sequence[Measured] | None) -> list[Measured]:
         return []
     records, responses = measured_of(data, "validation")
     return [*records, *responses]
+
+
+def _answers(nominal: Refit, names: tuple[str, ...] | None, validation: Validation, progress: Progress
+             ) -> tuple[Judged, Judged | None]:
+    """The answer, and where it names nothing that beside a room that wanders, if more is said then."""
+    judged = _judged(nominal, names, validation, progress)
+    moved = beside_a_wandering_room(judged, lambda moving: unless_finer(lasting_beyond_steps(
+        judge(searched(moving, names, validation, progress), validation, progress))), validation, progress)
+    if moved is None and too_warm(nominal) and asks_for_a_held_room(judged):
+        progress("once more, with a room no warmer than beside a machine that is only heated")
+        judged = unless_worse(judged, _judged(only_heated(nominal), names, validation, progress))
+    return judged, moved
+
+
+def _unless_it_wanders(found: Diagnosis, moved: Judged | None) -> Diagnosis:
+    """The answer, or where it names nothing and the log is read as it stands that beside a room that wanders."""
+    return found if moved is None or found.verdict != "unexplained" or found.means else concluded(moved)
 
 
 def _judged(nominal: Refit, names: tuple[str, ...] | None, validation: Validation, progress: Progress) -> Judged:
@@ -304,7 +318,7 @@ def _text(found: Diagnosis, caveats: tuple[str, ...]) -> str:
 def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
     """What to hold against the answer."""
     state, nominal, verdict = judged.state, judged.state.nominal, judged.verdict
-    said = [one for one in (judged.means, judged.finer) if one]
+    said = [one for one in (judged.means, judged.finer, judged.room) if one]
     said += [*nothing_fitted(nominal, verdict), *confirmed(found.effects)]
     if verdict == "named_with_remainder":
         said += place_undecided([one.key for one in found.effects], found.alternatives)

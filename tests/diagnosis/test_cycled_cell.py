@@ -57,8 +57,9 @@ def beside_a_finer_network() -> rt.diagnosis.Refit:
     return search.accept(search.refit_candidates(search.shortlist(state))).fit
 
 
-def from_one_start(structure: Structure, v: np.ndarray, floor: rt.diagnosis.NoiseEstimate) -> rt.diagnosis.Refit:
-    return _refitting.fitted(structure, v, floor, _refitting.NoiseScaling(1.0, {}))
+def from_one_start(structure: Structure, v: np.ndarray, floor: rt.diagnosis.NoiseEstimate,
+                   levels: _refitting.NoiseScaling) -> rt.diagnosis.Refit:
+    return _refitting.fitted(structure, v, floor, levels)
 
 
 def test_without_the_finer_network_a_fit_that_ends_before_it_converges_starts_once_more(

@@ -34,7 +34,7 @@ def test_radiation_between_two_lumps_is_named_with_its_coefficient(seed: int) ->
     assert abs(value - furnace.COEFFICIENT) < 3.0 * std < 0.5 * furnace.COEFFICIENT
     assert {one.label for one in found.effects} <= {"radiation(muffle, crucible)", "sensor_lag(T_crucible)",
                                                     "hidden_mass(muffle)"}
-    assert found.gap["validation"].after < 0.65 * found.gap["validation"].before
+    assert found.gap["validation"].after < 0.06 * found.gap["validation"].before  # 0.6 with radiation alone
     assert found.system.parameter("links.muffle-crucible 2.radiation") == pytest.approx(value, rel=0.3)
 
 

@@ -26,6 +26,7 @@ class Answer:
     verdict: str = "unexplained"
     why: str = ""
     validation: Validation | None = None
+    hold_out: None = None
 
 
 @pytest.mark.parametrize(("kept", "tested", "answer"), [

@@ -386,4 +386,5 @@ def expected_squares(fit: Refit, path: LinearizedRecord) -> Array:
     """Mean squares of the free-run residual of a record that its noise alone would give, (n_sensors,) [K²]."""
     noise, disturbance = fit.levels.of(path, fit.floor)
     slow = fit.levels.slow(path, fit.floor)
-    return np.asarray(heat_spread(path, disturbance) + noise**2 + (0.0 if slow is None else slow.std**2), np.float64)
+    squares = noise**2 if slow is None else noise**2 + slow.std**2
+    return np.asarray(heat_spread(path, disturbance, fit.levels.wandering(path)) + squares, np.float64)

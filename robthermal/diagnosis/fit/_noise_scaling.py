@@ -12,15 +12,19 @@ from numpy.typing import NDArray
 
 from ...fitting import rmse
 from ..data import NoiseEstimate
-from ..path import LinearizedRecord, SlowNoise, settled_cost
+from ..effects import conductances
+from ..path import LinearizedRecord, SlowNoise, Wandering, settled_cost
 
 Array = NDArray[np.float64]
+Noise = tuple[Array, Array, SlowNoise | None, Wandering | None]
 LARGEST_FACTOR = 1.4  # a free process noise would eat the physics: every level may change by at most this factor
 WIDE = 2.2  # asked only when nothing explains the records: is the declared level itself wrong?
 _CLOSE = 0.03
 _N_TRIED = 15  # five per cent apart
 _SHARES = np.geomspace(0.25, 1.0, 9)  # never more than the declared noise: it must not absorb physics
 _MEMORIES = np.geomspace(2.0, 30.0, 9)  # samples; what drifts more slowly is physics
+_WANDERS = [float(size) for size in np.geomspace(0.03, 3.0, 19)]  # K
+_PACES = (300.0, 1000.0, 3000.0, 10000.0)  # s: air conditioning, a door, a day
 _ROUNDS = 2  # of slow part and levels: each was found with the other
 
 
@@ -41,6 +45,10 @@ class NoiseScaling:
         without.
     memory : float
         Time constant of the slow part [s].
+    wander : float
+        Standard deviation of ambients that a record does not hold, about what the model says [K]; 0: they stand still.
+    pace : float
+        Time constant with which they wander [s].
     """
 
     disturbance: float
@@ -48,6 +56,13 @@ class NoiseScaling:
     limit: float = LARGEST_FACTOR
     share: float = 0.0
     memory: float = 0.0
+    wander: float = 0.0
+    pace: float = 0.0
+
+    @property
+    def declared(self) -> NoiseScaling:
+        """Levels as declared, with ambients that wander as these say."""
+        return NoiseScaling(1.0, {}, wander=self.wander, pace=self.pace)
 
     @property
     def sensors_exhausted(self) -> bool:
@@ -96,6 +111,45 @@ class NoiseScaling:
         std = np.minimum(self.share * self.of(path, floor)[0], declared)
         return SlowNoise(std, float(np.exp(-path.h / self.memory)))
 
+    def wandering(self, path: LinearizedRecord) -> Wandering | None:
+        """Ambients that the record does not hold; None where all are recorded, or stand still.
+
+        Parameters
+        ----------
+        path : LinearizedRecord
+            Simulated record, with what it holds.
+
+        Returns
+        -------
+        Wandering or None
+        """
+        names = [name for name in path.system.ambients if name not in path.one.record.input_names]
+        if not (self.wander and names):
+            return None
+        lumps = path.system.lump_names
+        G = np.zeros((len(lumps), len(names)))
+        for column, name in enumerate(names):
+            for lump, slope in conductances(path.system, name).items():
+                G[lumps.index(lump), column] = slope
+        return Wandering(np.full(len(names), self.wander), float(np.exp(-path.h / self.pace)), G)
+
+    def noise_of(self, path: LinearizedRecord, floor: NoiseEstimate) -> Noise:
+        """All that is random in a record: noise of its sensors, heat, slow part, ambients.
+
+        Parameters
+        ----------
+        path : LinearizedRecord
+            Simulated record with its sensors.
+        floor : NoiseEstimate
+            Declared noise levels.
+
+        Returns
+        -------
+        tuple
+            As `whitener` and `settled_cost` take it.
+        """
+        return *self.of(path, floor), self.slow(path, floor), self.wandering(path)
+
     def close_to(self, other: NoiseScaling) -> bool:
         """Whether all factors agree within three per cent, with the same slow part.
 
@@ -110,12 +164,15 @@ class NoiseScaling:
         """
         pairs = [(self.disturbance, other.disturbance)]
         pairs += [(value, other.noise.get(name, 1.0)) for name, value in self.noise.items()]
-        same = (self.share, self.memory) == (other.share, other.memory)
+        pairs += [(self.wander, other.wander)] if self.wander and other.wander else []
+        same = (self.share, self.memory, self.pace) == (other.share, other.memory, other.pace)
         return same and all(abs(a / b - 1.0) < _CLOSE for a, b in pairs)
 
     def __str__(self) -> str:
         sensors = ", ".join(f"{name} {factor:.2f}" for name, factor in self.noise.items())
         text = f"noise levels times: {sensors}; random heat {self.disturbance:.2f}"
+        if self.wander:
+            text += f"; ambients that are not recorded wander by {self.wander:.2g} K within {self.pace:.2g} s"
         return text if not self.share else (
             f"{text}; and the noise of every sensor has, besides its white part, a slow part of {self.share:.2f} times "
             f"its size that remembers {self.memory:.3g} s")
@@ -127,7 +184,9 @@ def refined(paths: Sequence[LinearizedRecord], floor: NoiseEstimate, levels: Noi
     cost = partial(_cost, paths, residuals, floor)
     factors = [float(t) for t in np.geomspace(1.0 / levels.limit, levels.limit, _N_TRIED)]
     heated = any(floor.disturbance.values())
-    if not heated and not levels.share:
+    if levels.wander:
+        levels = _lowest([replace(levels, wander=size) for size in _WANDERS], cost, _nearest(_WANDERS, levels.wander))
+    elif not heated and not levels.share:
         return replace(levels, noise=_by_spread(paths, residuals, floor, levels.limit))
     for name in floor.noise:
         levels = _lowest([replace(levels, noise={**levels.noise, name: factor}) for factor in factors], cost,
@@ -154,6 +213,20 @@ def with_slow_part(paths: Sequence[LinearizedRecord], floor: NoiseEstimate, leve
     return levels if inside and all(_is_slow(name, paths, floor, levels) for name in floor.noise) else None
 
 
+def with_wandering_ambients(paths: Sequence[LinearizedRecord], floor: NoiseEstimate, levels: NoiseScaling
+                            ) -> tuple[NoiseScaling, float] | None:
+    """Most likely wandering of ambients that no record holds, and by how much -2 log likelihood falls with it.
+
+    None where all are recorded, or joined to nothing.
+    """
+    if all(replace(levels, wander=1.0, pace=1.0).wandering(path) is None for path in paths):
+        return None
+    cost = partial(_cost, paths, _residuals(paths), floor)
+    found = _best([replace(levels, wander=size, pace=pace) for size in _WANDERS[::3] for pace in _PACES], cost)
+    found = refined(paths, floor, found)
+    return found, cost(levels) - cost(found)
+
+
 def _is_slow(name: str, paths: Sequence[LinearizedRecord], floor: NoiseEstimate, levels: NoiseScaling) -> bool:
     """Whether a slow part of this sensor's noise is more likely than white noise of the same size."""
     gain = 0.0
@@ -173,8 +246,7 @@ def _residuals(paths: Sequence[LinearizedRecord]) -> list[Array]:
 def _cost(paths: Sequence[LinearizedRecord], residuals: Sequence[Array], floor: NoiseEstimate, levels: NoiseScaling
           ) -> float:
     """-2 log likelihood of the residuals of all records."""
-    return sum(settled_cost(path, r, *levels.of(path, floor), levels.slow(path, floor))
-               for path, r in zip(paths, residuals, strict=True))
+    return sum(settled_cost(path, r, *levels.noise_of(path, floor)) for path, r in zip(paths, residuals, strict=True))
 
 
 def _by_spread(paths: Sequence[LinearizedRecord], residuals: Sequence[Array], floor: NoiseEstimate, limit: float

@@ -135,7 +135,8 @@ def coarsened(fit: Refit) -> Refit:
     plain = np.concatenate([fit.v[:n], own])
     coarse = tuple(path.coarse_columns(structure.base) for path in structure.paths(plain))
     finer = replace(structure, coarse=coarse)
-    return fitted(finer, np.concatenate([fit.v[:n], np.zeros(finer.n_coarse), own]), fit.floor, NoiseScaling(1.0, {}))
+    return fitted(finer, np.concatenate([fit.v[:n], np.zeros(finer.n_coarse), own]), fit.floor,
+                  fit.levels.declared)
 
 
 def exact(fit: Refit) -> Refit:
@@ -147,22 +148,21 @@ def _exact(fit: Refit) -> Refit:
     structure = replace(fit.structure, coarse=())
     n = structure.n_common
     v = np.concatenate([fit.v[:n], fit.v[fit.structure.n_common:]])
-    start = _from_either(structure, v, fit.floor) if fit.structure.coarse else fit
+    start = _from_either(structure, v, fit.floor, fit.levels.declared) if fit.structure.coarse else fit
     noise = {name: min(factor, 1.0) for name, factor in fit.levels.noise.items()}
     return replace(start, levels=replace(fit.levels, disturbance=min(fit.levels.disturbance, 1.0), noise=noise))
 
 
-def _from_either(structure: Structure, v: Array, floor: NoiseEstimate) -> Refit:
+def _from_either(structure: Structure, v: Array, floor: NoiseEstimate, levels: NoiseScaling) -> Refit:
     """Fit from v and, where that ends before it converges, from the declared parameters with the same effects.
 
     What a finer network would change has taken some of the work of the parameters; without it their valley may be far.
     """
-    fit = fitted(structure, v, floor, NoiseScaling(1.0, {}))
+    fit = fitted(structure, v, floor, levels)
     if fit.outcome.ok or not structure.n_parameters:
         return fit
     try:
-        other = fitted(structure, structure.start(structure.ranges.start, structure.quantities(v)), floor,
-                       NoiseScaling(1.0, {}))
+        other = fitted(structure, structure.start(structure.ranges.start, structure.quantities(v)), floor, levels)
         power = float(np.sum(Whitened(structure, fit.whiteners).residual(other.v) ** 2))
     except (Diverged, InputError):  # the declared parameters do not survive with these effects
         return fit
@@ -172,7 +172,7 @@ def _from_either(structure: Structure, v: Array, floor: NoiseEstimate) -> Refit:
 def only_heated(fit: Refit) -> Refit:
     """The same structure refitted with unknown ambients no warmer than a machine that is only heated allows."""
     structure = replace(fit.structure, only_heated=True)
-    return fitted(structure, np.clip(fit.v, *structure.bounds), fit.floor, NoiseScaling(1.0, {}))
+    return fitted(structure, np.clip(fit.v, *structure.bounds), fit.floor, fit.levels.declared)
 
 
 def relinearized(fit: Refit) -> Refit:
@@ -184,8 +184,7 @@ def filters(structure: Structure, v: Array, floor: NoiseEstimate, levels: NoiseS
             ) -> tuple[tuple[Linearized, ...], tuple[White, ...]]:
     """The model beside all data, linearized there, and what makes the errors of each data set white."""
     paths = structure.paths(v)
-    return paths, tuple(path.white(lambda record: (*levels.of(record, floor), levels.slow(record, floor)))
-                        for path in paths)
+    return paths, tuple(path.white(lambda record: levels.noise_of(record, floor)) for path in paths)
 
 
 def _refined(paths: Sequence[Linearized], floor: NoiseEstimate, levels: NoiseScaling) -> NoiseScaling:

@@ -80,16 +80,18 @@ def settled(A: Array, C: Array, R: Array, Q: Array) -> Array:
     raise np.linalg.LinAlgError("the covariance of the prediction does not settle")
 
 
-def spread(A: Array, Q: Array) -> Array:
-    """Covariances (n, n_z, n_z) before every sample of δ(k+1) = A(k) δ(k) + w(k), cov w = Q(k), from 0.
+def spread(A: Array, Q: Array, P: Array | None = None) -> Array:
+    """Covariances (n, n_z, n_z) before every sample of δ(k+1) = A(k) δ(k) + w(k), cov w = Q(k).
 
     Parameters
     ----------
     A, Q : ndarray, shape (n, n_z, n_z)
         Transitions, and covariances of what every sample adds.
+    P : ndarray, shape (n_z, n_z), optional
+        Covariance before the first sample; default 0.
     """
     a, q = _in_blocks(A), _in_blocks(Q)
-    P = _starts(a, np.zeros(a.shape), q, np.zeros(A.shape[1:]))
+    P = _starts(a, np.zeros(a.shape), q, np.zeros(A.shape[1:]) if P is None else P)
     out = np.empty(a.shape)
     for k in range(a.shape[1]):
         out[:, k] = P

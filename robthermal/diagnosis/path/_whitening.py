@@ -16,6 +16,7 @@ from ..._recursion import recursion
 from ...thermal import Equations
 from ._filter import compiled_for
 from ._riccati import filtered, settled, spread
+from ._wandering import Wandering
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -189,7 +190,8 @@ class Whitener:
         return np.ascontiguousarray(carry), out.reshape(len(sample), _BLOCK * n_sensors, -1)
 
 
-def whitener(path: LinearSteps, noise: Array, disturbance: Array, slow: SlowNoise | None = None) -> Whitener:
+def whitener(path: LinearSteps, noise: Array, disturbance: Array, slow: SlowNoise | None = None,
+             wandering: Wandering | None = None) -> Whitener:
     """Filter along one record.
 
     Parameters
@@ -202,16 +204,21 @@ def whitener(path: LinearSteps, noise: Array, disturbance: Array, slow: SlowNois
         Random heat of every lump [W/√Hz].
     slow : SlowNoise, optional
         On top of the white noise.
+    wandering : Wandering, optional
+        Ambients that the record does not hold.
     """
     A, C = path.steps[0], path.C
     n, each = len(A), np.eye(noise.size)
     squares = np.broadcast_to(noise**2, (n, noise.size))
     if path.one.missing is not None:
         squares = squares + _IGNORED**2 * path.one.missing
-    if slow is None and not disturbance.any():
+    if slow is None and wandering is None and not disturbance.any():
         return Whitener(A, C, np.zeros((n, A.shape[1], C.shape[1])), (1.0 / np.sqrt(squares))[:, :, None] * each)
     R = squares[:, :, None] * each
     Q, P = gathered(path, disturbance), np.zeros(A.shape[1:])
+    if wandering is not None:
+        A, C, Q = wandering.beside(A, C, Q, path.steps[1] + path.steps[2])
+        P = block_diag(P, wandering.covariance)
     if slow is not None:
         A, C, Q = slow.beside(A, C, Q)
         P = block_diag(P, slow.covariance)
@@ -233,8 +240,8 @@ def gathered(path: LinearSteps, disturbance: Array, M: Array | None = None) -> A
     return Q[kind] if one_by_one else Q
 
 
-def heat_spread(path: LinearSteps, disturbance: Array) -> Array:
-    """Mean squares (n_sensors,) of what random heat alone does to the readings of a free run [K²].
+def heat_spread(path: LinearSteps, disturbance: Array, wandering: Wandering | None = None) -> Array:
+    """Mean squares (n_sensors,) of what random heat and ambients do to the readings of a free run [K²].
 
     Parameters
     ----------
@@ -242,15 +249,21 @@ def heat_spread(path: LinearSteps, disturbance: Array) -> Array:
         Linearization along the simulated record.
     disturbance : ndarray, shape (n_lumps,)
         Random heat of every lump [W/√Hz].
+    wandering : Wandering, optional
+        Ambients that the record does not hold.
     """
-    if not disturbance.any():
+    if wandering is None and not disturbance.any():
         return np.zeros(path.C.shape[1])
-    P = spread(path.steps[0], gathered(path, disturbance))
-    return np.asarray(np.einsum("ksi,ksi->s", path.C @ P, path.C) / len(P), np.float64)
+    A, C, Q, P = path.steps[0], path.C, gathered(path, disturbance), np.zeros(path.steps[0].shape[1:])
+    if wandering is not None:
+        A, C, Q = wandering.beside(A, C, Q, path.steps[1] + path.steps[2])
+        P = block_diag(P, wandering.covariance)
+    P = spread(A, Q, P)
+    return np.asarray(np.einsum("ksi,ksi->s", C @ P, C) / len(P), np.float64)
 
 
-def settled_cost(path: LinearSteps, r: Array, noise: Array, disturbance: Array, slow: SlowNoise | None = None
-                 ) -> float:
+def settled_cost(path: LinearSteps, r: Array, noise: Array, disturbance: Array, slow: SlowNoise | None = None,
+                 wandering: Wandering | None = None) -> float:
     """-2 log likelihood of residuals r (n, n_sensors) under the settled filter at the mean of the linearization.
 
     Good enough for noise levels, and faster than the time-varying filter. Infinite where nothing settles: what no
@@ -258,6 +271,8 @@ def settled_cost(path: LinearSteps, r: Array, noise: Array, disturbance: Array, 
     """
     A, C, M = path.mean
     Q, R = gathered(path, disturbance, M), np.diag(noise**2)
+    if wandering is not None:
+        A, C, Q = wandering.beside(A, C, Q, _held(M, path.equations.capacity, path.h))
     if slow is not None:
         A, C, Q = slow.beside(A, C, Q)
     try:
@@ -271,3 +286,11 @@ def settled_cost(path: LinearSteps, r: Array, noise: Array, disturbance: Array, 
     e = r - states @ C.T
     with np.errstate(over="ignore"):  # of a model that runs away: infinite, and not chosen
         return float(np.sum((e @ np.linalg.inv(S)) * e)) + len(r) * float(np.linalg.slogdet(S)[1])
+
+
+def _held(M: Array, capacity: Array, h: float) -> Array:
+    """How heats into the lumps that are constant over a sample of length h enter deviations with rates M (n_z, n)."""
+    n_z, n = len(M), capacity.size
+    wide = np.zeros((n_z + n, n_z + n))
+    wide[:n_z, :n_z], wide[:n, n_z:] = M, np.diag(1.0 / capacity)
+    return np.asarray(expm(wide * h)[:n_z, n_z:], np.float64)
