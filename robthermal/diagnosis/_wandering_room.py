@@ -12,11 +12,16 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ..errors import Diverged, InputError
-from ._judge import Judged, Progress, Validation
-from .evidence import HoldOut
+from ._judge import Judged, Progress, Validation, Verdict
+from ._lasting import evidence_of
+from ._outcomes import DiagnosisCode
+from .evidence import SURE, Evidence, HoldOut
 from .fit import Refit, wandering
+from .search import SearchState, one_place, without
 
 _EXPLAINED = 0.49  # of the whitened excess on validation records, that names may leave: 70 % of its root
+_FAR = 3.0  # K, of a room within an hour; within a shorter time less, as in a random walk
+_NEARLY = 1.5  # whitened variance, of training and of validation records, beside which the rest is small
 
 
 def beside_a_wandering_room(judged: Judged, again: Callable[[Refit], Judged], validation: Validation,
@@ -44,16 +49,68 @@ def beside_a_wandering_room(judged: Judged, again: Callable[[Refit], Judged], va
         return None
     if other.verdict == "consistent":
         return replace(judged, room=f"{_wanders(moving)}, which explains these records: nothing else need be missing.")
+    if other.verdict == "unexplained":
+        other = _with_remainder(other, moving, validation)
     if other.verdict == "unexplained" or not _confirmed(other.hold_out):
         return None
     held = validation.predicted(still, other.plain or other.state.fit)  # the gap is that of the system as it was
     return replace(other, state=replace(other.state, nominal=still), hold_out=held,
-                   room=f"{_wanders(other.state.fit)}; what is named is told from what the room can have done.")
+                   room=f"{_wanders(other.state.fit)}; what is named is told from what the room can have done."
+                        f"{_too_much(other.state.fit)}")
+
+
+def _with_remainder(judged: Judged, moving: Refit, validation: Validation) -> Judged:
+    """Names with what little is left beside them: those that last, and are needed on data that no fit has seen."""
+    if not judged.state.rounds or judged.hold_out is None or not _small(judged.state, judged.hold_out):
+        return judged
+    state, evidence = _lasting(judged.state, moving, validation)
+    held = validation.predicted(moving, state.fit) if state.rounds else None
+    if held is None or not _small(state, held):
+        return judged
+    ambiguous = not all(one_place(round_, moving.structure.base) for round_ in state.rounds)
+    verdict: Verdict = "ambiguous" if ambiguous else "named_with_remainder"
+    code = DiagnosisCode.AMBIGUOUS if ambiguous else DiagnosisCode.NAMED_WITH_REMAINDER
+    return replace(judged, state=state, hold_out=held, verdict=verdict, outcome=code.outcome(), plain=state.fit,
+                   evidence=evidence)
+
+
+def _small(state: SearchState, held: HoldOut) -> bool:
+    """Whether little more than noise is left of training and of validation records."""
+    return max(state.fit.variance, held.variance_after) <= _NEARLY
+
+
+def _lasting(state: SearchState, moving: Refit, validation: Validation) -> tuple[SearchState, tuple[Evidence, ...]]:
+    """Effects that hold over blocks and segments and are needed, one taken out after the other; and their evidence."""
+    evidence = evidence_of(state.rounds, state.fit, moving)
+    for place, one in enumerate(evidence):
+        if one.stability.constant and one.reproducible >= SURE and _needed(state, place, moving, validation):
+            continue
+        less = without(state.fit, place, moving, state.rounds[place].before)
+        rounds = [round_ for at, round_ in enumerate(state.rounds) if at != place]
+        if less is None or not rounds:
+            return replace(state, rounds=()), ()
+        rounds[-1] = replace(rounds[-1], best=replace(rounds[-1].best, fit=less))
+        return _lasting(replace(state, rounds=tuple(rounds), fit=less), moving, validation)
+    return state, evidence
+
+
+def _needed(state: SearchState, place: int, moving: Refit, validation: Validation) -> bool:
+    """Whether validation records, whitened, are predicted much better with an effect than without it."""
+    less = without(state.fit, place, moving, state.rounds[place].before)
+    held = None if less is None else validation.predicted(less, state.fit)
+    return held is not None and held.excess_ratio <= _EXPLAINED
 
 
 def _confirmed(held: HoldOut | None) -> bool:
     """Whether data that no fit has seen are predicted, or most of what was left of them without the effects is gone."""
     return held is None or held.outcome.ok or held.excess_ratio <= _EXPLAINED
+
+
+def _too_much(fit: Refit) -> str:
+    """That no room does so, where it stands for more than a room."""
+    names, levels = " and ".join(fit.unrecorded), fit.levels
+    return (f" No room does that: a path to {names} that changes, such as a fan or a door, or a heat at what is joined "
+            f"to it may be missing, too." if levels.wander > _FAR * (levels.pace / 3600.0) ** 0.5 else "")
 
 
 def _wanders(fit: Refit) -> str:

@@ -185,7 +185,7 @@ def refined(paths: Sequence[LinearizedRecord], floor: NoiseEstimate, levels: Noi
     factors = [float(t) for t in np.geomspace(1.0 / levels.limit, levels.limit, _N_TRIED)]
     heated = any(floor.disturbance.values())
     if levels.wander:
-        levels = _lowest([replace(levels, wander=size) for size in _WANDERS], cost, _nearest(_WANDERS, levels.wander))
+        levels = _wandering_as_likely(levels, cost)
     elif not heated and not levels.share:
         return replace(levels, noise=_by_spread(paths, residuals, floor, levels.limit))
     for name in floor.noise:
@@ -211,6 +211,14 @@ def with_slow_part(paths: Sequence[LinearizedRecord], floor: NoiseEstimate, leve
         levels = refined(paths, floor, levels)
     inside = levels.share > _SHARES[0] and levels.memory < _MEMORIES[-1] * h
     return levels if inside and all(_is_slow(name, paths, floor, levels) for name in floor.noise) else None
+
+
+def _wandering_as_likely(levels: NoiseScaling, cost: Callable[[NoiseScaling], float]) -> NoiseScaling:
+    """Most likely time constant of the ambients' wandering, and its size: what was missing before has moved both."""
+    paced = [replace(levels, pace=pace, wander=levels.wander * math.sqrt(pace / levels.pace)) for pace in _PACES]
+    sized = [_lowest([replace(one, wander=size) for size in _WANDERS], cost, _nearest(_WANDERS, one.wander))
+             for one in paced]
+    return _best(sized, cost)
 
 
 def with_wandering_ambients(paths: Sequence[LinearizedRecord], floor: NoiseEstimate, levels: NoiseScaling
