@@ -12,12 +12,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ..errors import Diverged, InputError
+from ._explained_away import STORING
 from ._judge import Judged, Progress, Validation, Verdict
 from ._lasting import evidence_of
 from ._outcomes import DiagnosisCode
-from .evidence import SURE, Evidence, HoldOut
-from .fit import Refit, wandering
-from .search import SearchState, one_place, without
+from .evidence import BIC_GAP, SURE, Evidence, HoldOut
+from .fit import Refit, coarsened, extended, wandering
+from .search import SearchState, delta_bic, one_place, without
 
 _EXPLAINED = 0.49  # of the whitened excess on validation records, that names may leave: 70 % of its root
 _FAR = 3.0  # K, of a room within an hour; within a shorter time less, as in a random walk
@@ -83,9 +84,10 @@ def _lasting(state: SearchState, moving: Refit, validation: Validation) -> tuple
     """Effects that hold over blocks and segments and are needed, one taken out after the other; and their evidence."""
     evidence = evidence_of(state.rounds, state.fit, moving)
     for place, one in enumerate(evidence):
-        if one.stability.constant and one.reproducible >= SURE and _needed(state, place, moving, validation):
-            continue
         less = without(state.fit, place, moving, state.rounds[place].before)
+        if (one.stability.constant and one.reproducible >= SURE and _needed(state.fit, less, validation)
+                and _beside_a_finer_network(state, place, less)):
+            continue
         rounds = [round_ for at, round_ in enumerate(state.rounds) if at != place]
         if less is None or not rounds:
             return replace(state, rounds=()), ()
@@ -94,11 +96,18 @@ def _lasting(state: SearchState, moving: Refit, validation: Validation) -> tuple
     return state, evidence
 
 
-def _needed(state: SearchState, place: int, moving: Refit, validation: Validation) -> bool:
+def _needed(fit: Refit, less: Refit | None, validation: Validation) -> bool:
     """Whether validation records, whitened, are predicted much better with an effect than without it."""
-    less = without(state.fit, place, moving, state.rounds[place].before)
-    held = None if less is None else validation.predicted(less, state.fit)
+    held = None if less is None else validation.predicted(less, fit)
     return held is not None and held.excess_ratio <= _EXPLAINED
+
+
+def _beside_a_finer_network(state: SearchState, place: int, less: Refit | None) -> bool:
+    """Whether an effect that stores heat or is late is worth its unknowns beside what a finer network would change."""
+    if less is None or state.rounds[place].best.candidate.effect.name not in STORING:
+        return less is not None
+    whole, other = coarsened(state.fit), coarsened(less)
+    return delta_bic(extended(whole, other.structure, other.v), whole) > BIC_GAP
 
 
 def _confirmed(held: HoldOut | None) -> bool:
@@ -117,4 +126,4 @@ def _wanders(fit: Refit) -> str:
     names, levels = fit.unrecorded, fit.levels
     return (f"{' and '.join(names)}, which {'was' if len(names) == 1 else 'were'} not recorded, "
             f"{'is' if len(names) == 1 else 'are'} taken to wander by {levels.wander:.2g} K within "
-            f"{levels.pace / 60.0:.2g} min")
+            f"{levels.pace / 60.0:.0f} min")

@@ -30,6 +30,7 @@ from ._revise import without as without
 from ._short_list import Entry as Entry
 from ._short_list import ShortList as ShortList
 from ._short_list import beside as beside
+from ._short_list import delta_bic as delta_bic
 from ._short_list import leaves_large_misfit as leaves_large_misfit
 from ._short_list import quantities_of as quantities_of
 from ._short_list import refit_short_list as refit_short_list
@@ -48,8 +49,8 @@ from ._wider_noise import with_wider_noise as with_wider_noise
 
 __all__ = ["ALIKE", "MASSES", "Accepted", "Decision", "EffectSet", "Entry", "JointCheck", "JointSelection",
            "SearchState", "ShortList", "accept", "begin", "beside", "between_trials", "checked_jointly", "compare",
-           "decide", "exchange", "from_slow_thermometer", "heats_instead", "implausible_names", "leaves_large_misfit",
-           "needed", "one_place", "other_laws", "other_periods", "other_thermometers", "quantities_of", "reconsider",
-           "refit_candidates", "refit_set", "refit_short_list", "resolve_alternatives", "resolve_places", "revise",
-           "revised", "ruled_out", "select_jointly", "shortlist", "validate", "with_neighbors", "with_other_end",
-           "with_wider_noise", "without", "without_contradicted"]
+           "decide", "delta_bic", "exchange", "from_slow_thermometer", "heats_instead", "implausible_names",
+           "leaves_large_misfit", "needed", "one_place", "other_laws", "other_periods", "other_thermometers",
+           "quantities_of", "reconsider", "refit_candidates", "refit_set", "refit_short_list", "resolve_alternatives",
+           "resolve_places", "revise", "revised", "ruled_out", "select_jointly", "shortlist", "validate",
+           "with_neighbors", "with_other_end", "with_wider_noise", "without", "without_contradicted"]
