@@ -23,7 +23,7 @@ from .search import SearchState
 
 _CLOSED = 0.92  # of the excess mean square, that an effect removes which needs no finer network
 _CLOSED_BY_PATHS = 0.85  # the same, where none of the effects stores heat or is late
-STORING = ("hidden_mass", "path_mass", "sensor_lag", "input_lag", "input_delay")
+_STORING = ("hidden_mass", "path_mass", "sensor_lag", "input_lag", "input_delay")
 _MISFIT = 2.0  # whitened variance that a finer network leaves, to explain nothing away
 _RENEWED = 3  # times
 _FAR_LESS = 0.5  # of the excess mean square that it leaves: no more may be left by the effects
@@ -61,7 +61,7 @@ def predicting_alone(state: SearchState, finer: Refit, validation: Validation) -
 
 def _needed(state: SearchState) -> float:
     """Share of the excess mean square that these effects have to remove where a finer network would, too."""
-    storing = any(round_.best.candidate.effect.name in STORING for round_ in state.rounds)
+    storing = any(round_.best.candidate.effect.name in _STORING for round_ in state.rounds)
     return _CLOSED if storing else _CLOSED_BY_PATHS
 
 

@@ -12,10 +12,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ..errors import Diverged, InputError
-from ._explained_away import STORING
 from ._judge import Judged, Progress, Validation, Verdict
 from ._lasting import evidence_of
 from ._outcomes import DiagnosisCode
+from ._rivals import at_neighboring_lumps
 from .evidence import BIC_GAP, SURE, Evidence, HoldOut
 from .fit import Refit, coarsened, extended, wandering
 from .search import SearchState, delta_bic, one_place, without
@@ -68,6 +68,7 @@ def _with_remainder(judged: Judged, moving: Refit, validation: Validation) -> Ju
     held = validation.predicted(moving, state.fit) if state.rounds else None
     if held is None or not _small(state, held):
         return judged
+    state = at_neighboring_lumps(state)
     ambiguous = not all(one_place(round_, moving.structure.base) for round_ in state.rounds)
     verdict: Verdict = "ambiguous" if ambiguous else "named_with_remainder"
     code = DiagnosisCode.AMBIGUOUS if ambiguous else DiagnosisCode.NAMED_WITH_REMAINDER
@@ -86,7 +87,7 @@ def _lasting(state: SearchState, moving: Refit, validation: Validation) -> tuple
     for place, one in enumerate(evidence):
         less = without(state.fit, place, moving, state.rounds[place].before)
         if (one.stability.constant and one.reproducible >= SURE and _needed(state.fit, less, validation)
-                and _beside_a_finer_network(state, place, less)):
+                and _beside_a_finer_network(state.fit, less)):
             continue
         rounds = [round_ for at, round_ in enumerate(state.rounds) if at != place]
         if less is None or not rounds:
@@ -102,11 +103,11 @@ def _needed(fit: Refit, less: Refit | None, validation: Validation) -> bool:
     return held is not None and held.excess_ratio <= _EXPLAINED
 
 
-def _beside_a_finer_network(state: SearchState, place: int, less: Refit | None) -> bool:
-    """Whether an effect that stores heat or is late is worth its unknowns beside what a finer network would change."""
-    if less is None or state.rounds[place].best.candidate.effect.name not in STORING:
-        return less is not None
-    whole, other = coarsened(state.fit), coarsened(less)
+def _beside_a_finer_network(fit: Refit, less: Refit | None) -> bool:
+    """Whether an effect is worth its unknowns beside what a finer network would change."""
+    if less is None:
+        return False
+    whole, other = coarsened(fit), coarsened(less)
     return delta_bic(extended(whole, other.structure, other.v), whole) > BIC_GAP
 
 
