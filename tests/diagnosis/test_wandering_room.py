@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import air_conditioned as machine
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ import robthermal as rt
 from robthermal.diagnosis.data import as_measured
 from robthermal.diagnosis.fit import NoiseScaling, wandering
 from robthermal.diagnosis.path import LinearizedRecord, Wandering, linearized_record, settled_cost, whitener
-from robthermal.jobs.diagnose._answer import answer_sentence
+from robthermal.jobs.diagnose._answer import answer_sentence, number_that_matters
 
 KEYS = {"path": ("missing_link", ("a", "b")), "mass": ("hidden_mass", ("p",)), "share": ("input_feedthrough",
                                                                                          ("q1", "p"))}
@@ -111,3 +113,14 @@ def test_conductances_to_the_room_carry_it() -> None:
     found = NoiseScaling(1.0, {}, wander=0.4, pace=300.0).wandering(path)
     assert found is not None and found.G.tolist() == [[0.2], [0.0]] and found.std.tolist() == [0.4]
     assert found.pole == pytest.approx(np.exp(-3.0 / 300.0)) and NoiseScaling(1.0, {}).wandering(path) is None
+
+
+def test_the_first_sentence_says_what_is_left_of_the_gap() -> None:
+    """Free runs know nothing of the room: with the mass their error hardly falls, and most of it is the room's."""
+    still = rt.diagnose(machine.model(), machine.day(41, "path", recorded=True), effects=["missing_link"])
+    assert "falls from" in answer_sentence(still) and "the room's" not in answer_sentence(still)
+    assert number_that_matters(still)[2].startswith("Noise alone would give")
+    fit = replace(still.fit, levels=replace(still.fit.levels, wander=0.4, pace=300.0))
+    moved = replace(still, fit=fit, gap={"train": rt.diagnosis.Gap(0.20, 0.19, 0.18)})
+    assert "falls from 0.2 to 0.19 K: most of it is the room's." in answer_sentence(moved)
+    assert number_that_matters(moved)[2] == "Noise and a room that wanders would give 0.18 K."

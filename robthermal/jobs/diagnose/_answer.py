@@ -72,8 +72,8 @@ def number_that_matters(found: Diagnosis) -> tuple[str, str, str]:
     """
     gap, records = _shown(found)
     size = f"{gap.before:.2g} → {gap.after:.2g} {gap.unit}" if found.effects else f"{gap.before:.2g} {gap.unit}"
-    return (f"Error of the model on {records}, root mean square", size,
-            f"Noise alone would give {gap.noise:.2g} {gap.unit}.")
+    cause = "Noise and a room that wanders" if found.fit.levels.wander else "Noise alone"
+    return f"Error of the model on {records}, root mean square", size, f"{cause} would give {gap.noise:.2g} {gap.unit}."
 
 
 def accepted_in_words(found: Diagnosis) -> str:
