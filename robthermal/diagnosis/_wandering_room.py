@@ -22,6 +22,7 @@ from .search import SearchState, delta_bic, one_place, without
 
 _EXPLAINED = 0.49  # of the whitened excess on validation records, that names may leave: 70 % of its root
 _FAR = 3.0  # K, of a room within an hour; within a shorter time less, as in a random walk
+_REST = 0.1  # of the whitened excess on validation records: the rest of a coarse network
 _NEARLY = 1.5  # whitened variance, of training and of validation records, beside which the rest is small
 
 
@@ -62,11 +63,11 @@ def beside_a_wandering_room(judged: Judged, again: Callable[[Refit], Judged], va
 
 def _with_remainder(judged: Judged, moving: Refit, validation: Validation) -> Judged:
     """Names with what little is left beside them: those that last, and are needed on data that no fit has seen."""
-    if not judged.state.rounds or judged.hold_out is None or not _small(judged.state, judged.hold_out):
+    if not judged.state.rounds or judged.hold_out is None or not _small(judged.state.fit, judged.hold_out):
         return judged
     state, evidence = _lasting(judged.state, moving, validation)
     held = validation.predicted(moving, state.fit) if state.rounds else None
-    if held is None or not _small(state, held):
+    if held is None or not _small(state.fit, held):
         return judged
     state = at_neighboring_lumps(state)
     ambiguous = not all(one_place(round_, moving.structure.base) for round_ in state.rounds)
@@ -76,9 +77,11 @@ def _with_remainder(judged: Judged, moving: Refit, validation: Validation) -> Ju
                    evidence=evidence)
 
 
-def _small(state: SearchState, held: HoldOut) -> bool:
-    """Whether little more than noise is left of training and of validation records."""
-    return max(state.fit.variance, held.variance_after) <= _NEARLY
+def _small(fit: Refit, held: HoldOut) -> bool:
+    """Whether little more than noise is left: of training records at most beside what a finer network would change."""
+    if held.variance_after > _NEARLY and not held.excess_ratio <= _REST:
+        return False
+    return fit.variance <= _NEARLY or coarsened(fit).variance <= _NEARLY
 
 
 def _lasting(state: SearchState, moving: Refit, validation: Validation) -> tuple[SearchState, tuple[Evidence, ...]]:
