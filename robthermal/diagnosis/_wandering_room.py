@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ..errors import Diverged, InputError
-from ._judge import Judged, Progress, Validation, Verdict
+from ._judge import Judged, Progress, Validation, Verdict, no_names
 from ._lasting import evidence_of
 from ._outcomes import DiagnosisCode
 from ._rivals import at_neighboring_lumps
@@ -21,6 +21,7 @@ from .fit import Refit, coarsened, extended, wandering
 from .search import SearchState, delta_bic, one_place, without
 
 _EXPLAINED = 0.49  # of the whitened excess on validation records, that names may leave: 70 % of its root
+_WORTH = 0.03  # of ΔBIC for every reading beside a finer network: what is coarse in a plate gained half of it
 _FAR = 3.0  # K, of a room within an hour; within a shorter time less, as in a random walk
 _REST = 0.1  # of the whitened excess on validation records: the rest of a coarse network
 _NEARLY = 1.5  # whitened variance, of training and of validation records, beside which the rest is small
@@ -41,14 +42,18 @@ def beside_a_wandering_room(judged: Judged, again: Callable[[Refit], Judged], va
     progress : callable
         Called with a sentence before the search.
     """
-    still = judged.state.nominal
-    if judged.verdict != "unexplained" or (moving := wandering(still)) is None:
+    if judged.verdict != "unexplained" or (moving := wandering(judged.state.nominal)) is None:
         return None
     progress("once more, with a room that wanders")
     try:
-        other = again(moving)
-    except (Diverged, InputError):
+        return _answer(judged, moving, again(moving), validation)
+    except (Diverged, InputError):  # a model that runs away is no explanation
         return None
+
+
+def _answer(judged: Judged, moving: Refit, other: Judged, validation: Validation) -> Judged | None:
+    """What is said beside a room that wanders."""
+    still = judged.state.nominal
     if other.verdict == "consistent":
         return replace(judged, room=f"{_wanders(moving)}, which explains these records: nothing else need be missing.")
     if other.verdict == "unexplained":
@@ -67,7 +72,7 @@ def _with_remainder(judged: Judged, moving: Refit, validation: Validation) -> Ju
         return judged
     state, evidence = _lasting(judged.state, moving, validation)
     held = validation.predicted(moving, state.fit) if state.rounds else None
-    if held is None or not _small(state.fit, held):
+    if held is None or not _small(state.fit, held) or no_names(state):
         return judged
     state = at_neighboring_lumps(state)
     ambiguous = not all(one_place(round_, moving.structure.base) for round_ in state.rounds)
@@ -111,7 +116,8 @@ def _beside_a_finer_network(fit: Refit, less: Refit | None) -> bool:
     if less is None:
         return False
     whole, other = coarsened(fit), coarsened(less)
-    return delta_bic(extended(whole, other.structure, other.v), whole) > BIC_GAP
+    gained = delta_bic(extended(whole, other.structure, other.v), whole)
+    return gained > max(BIC_GAP, _WORTH * whole.n_readings)
 
 
 def _confirmed(held: HoldOut | None) -> bool:
