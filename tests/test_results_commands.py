@@ -213,7 +213,7 @@ def test_new_overwrites_nothing(run: Run, starter: Path, results: Path, tmp_path
 def test_every_effect_kind_and_code_is_explained(run: Run) -> None:
     known = rt.jobs.explainable()
     assert set(known["effect"]) == {*rt.thermal.effects(), "parameter_change", "ambient_drift"}
-    assert len(known["effect"]) == 35
+    assert len(known["effect"]) == 36
     assert set(known["certificate"]) == set(KINDS) == set(KIND_ASSUMPTIONS)
     assert set(known["reason"]) == {code.code for code in rt.jobs.claims.GateCode}
     assert {"named", "ambiguous", "consistent", "unexplained", "not_certified", "converged"} <= set(known["outcome"])
