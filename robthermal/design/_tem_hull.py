@@ -17,6 +17,7 @@ from ..thermal import Equations, Module, System
 from ._modules import Array
 
 _MOST = 4096  # joint vertices of `tem_polytope`
+_CONSTANT = (".heat", ".self_heating")  # heats without slopes
 _SAME = 1e-12  # relative: two control points closer than this are one
 _CHUNK = 2048
 
@@ -167,7 +168,7 @@ def tem_polytope(system: System, *, temperature: Any, current: Any, covariance: 
     Raises
     ------
     InputError
-        Boxes that do not fit the system, more than 4096 vertices.
+        Boxes that do not fit the system, more than 4096 vertices, effects whose slopes the hull does not hold.
 
     References
     ----------
@@ -181,6 +182,7 @@ def tem_polytope(system: System, *, temperature: Any, current: Any, covariance: 
     (729, 18, ['m1', 'm2'])
     """
     box = read_box(system, temperature, current, covariance, probability, ambient, capacities=True)
+    _refuse_effects(system)
     hull, shares = tem_hull(system, box), _capacity_shares(system, box["parameters"])
     if hull.count * len(shares) > _MOST:
         raise InputError(f"{hull.count * len(shares)} vertices", where="argument system", expected=f"at most {_MOST}",
@@ -189,6 +191,15 @@ def tem_polytope(system: System, *, temperature: Any, current: Any, covariance: 
     zero = np.zeros((len(names), len(system.modules)))
     return [control.ss(share * A, share * B, eye, zero, states=names, inputs=list(system.module_names), outputs=names)
             for share in shares for A, B in zip(*hull.at(np.arange(hull.count)), strict=True)]
+
+
+def _refuse_effects(system: System) -> None:
+    """A hull that leaves out the slope of a heat holds those of another machine."""
+    for name in system.effects:
+        if not name.endswith(_CONSTANT) or name.endswith(".hysteresis.heat"):
+            raise InputError(f"{name} = {system.parameter(name):g} has slopes that this hull does not hold",
+                             where="argument system", expected="a network of links, modules and lumps only",
+                             remedy="Set it to 0; a conductance that it changes can be a range of `covariance`.")
 
 
 def _capacity_shares(system: System, parameters: Mapping[str, Sequence[float]]) -> list[Array]:

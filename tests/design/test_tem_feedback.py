@@ -326,3 +326,23 @@ def test_two_modules_that_share_a_sink():
         path = run(d, x, lambda t: (298.0, {}), 200.0, 100) - rest
         V = np.einsum("ti,ij,tj->t", path, d.matrix, path)
         assert (V <= V[0] * np.exp(-4 * d.rate * np.arange(101)) * (1 + 1e-6)).all()
+
+
+@pytest.mark.parametrize(("effect", "where", "values"), [
+    ("conductance_exponent", ["plate-module"], {"exponent": 1.0}), ("thomson", ["m"], {"coefficient": 1e-3}),
+    ("driven_conductance", ["plate-module", "m"], {"relative": 0.5}),
+    ("lead_heating", ["sink", "m"], {"resistance": 0.1}),
+    ("ambient_gradient", ["plate"], {"difference": 2.0}), ("hysteresis", ["m"], {"heat": 0.2, "time_constant": 9.0})])
+def test_a_polytope_refuses_effects_whose_slopes_it_does_not_hold(effect, where, values):
+    """It had left them out: its plants were those of another machine."""
+    added = rt.thermal.add_effect(stage(), effect, where, values)
+    name = next(iter(added.system.effects))
+    with pytest.raises(InputError, match=re.escape(name) + r" = .* has slopes that this hull does not hold"):
+        rt.design.tem_polytope(added.system, temperature=(280.0, 320.0), current=(0.0, 1.0))
+
+
+def test_a_constant_heat_is_no_slope_of_a_polytope():
+    plain, heated = (rt.design.tem_polytope(one, temperature=(280.0, 320.0), current=(0.0, 1.0)) for one in (
+        stage(), rt.thermal.add_effect(stage(), "heat_source", ["plate"], {"heat": 0.5}).system))
+    assert len(plain) == len(heated)
+    assert all(np.array_equal(a.A, b.A) and np.array_equal(a.B, b.B) for a, b in zip(plain, heated, strict=True))
