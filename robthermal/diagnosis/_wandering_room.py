@@ -17,7 +17,7 @@ from ._lasting import evidence_of
 from ._outcomes import DiagnosisCode
 from ._rivals import at_neighboring_lumps
 from .evidence import BIC_GAP, SURE, Evidence, HoldOut
-from .fit import Refit, coarsened, extended, wandering
+from .fit import Refit, coarsened, extended, with_random_ambients
 from .search import SearchState, delta_bic, one_place, without
 
 _EXPLAINED = 0.49  # of the whitened excess on validation records, that names may leave: 70 % of its root
@@ -42,7 +42,7 @@ def beside_a_wandering_room(judged: Judged, again: Callable[[Refit], Judged], va
     progress : callable
         Called with a sentence before the search.
     """
-    if judged.verdict != "unexplained" or (moving := wandering(judged.state.nominal)) is None:
+    if judged.verdict != "unexplained" or (moving := with_random_ambients(judged.state.nominal)) is None:
         return None
     progress("once more, with a room that wanders")
     try:

@@ -11,8 +11,8 @@ from scipy.linalg import cholesky, expm, toeplitz
 
 import robthermal as rt
 from robthermal.diagnosis.data import as_measured
-from robthermal.diagnosis.fit import NoiseScaling, wandering
-from robthermal.diagnosis.path import LinearizedRecord, Wandering, linearized_record, settled_cost, whitener
+from robthermal.diagnosis.fit import NoiseScaling, with_random_ambients
+from robthermal.diagnosis.path import LinearizedRecord, RandomAmbients, linearized_record, settled_cost, whitener
 from robthermal.jobs.diagnose._answer import answer_sentence, number_that_matters
 
 KEYS = {"path": ("missing_link", ("a", "b")), "mass": ("hidden_mass", ("p",)), "share": ("input_feedthrough",
@@ -55,7 +55,8 @@ def test_a_room_that_wanders_alone_is_said_to_be_enough(seed: int) -> None:
 def test_a_room_that_is_recorded_or_stands_still_does_not_wander() -> None:
     system = machine.model()
     for record in (machine.day(31, "path", recorded=True), machine.day(31, "nothing", swing=1e-3)):
-        assert wandering(rt.diagnosis.refit(system, record, rt.diagnosis.noise_floor(system, record))) is None
+        fit = rt.diagnosis.refit(system, record, rt.diagnosis.noise_floor(system, record))
+        assert with_random_ambients(fit) is None
 
 
 def at_rest(n: int) -> LinearizedRecord:
@@ -88,8 +89,8 @@ def dense(n: int) -> np.ndarray:
     return L @ (STD**2 * toeplitz(POLE ** np.arange(n))) @ L.T + np.diag(np.tile(NOISE**2, n))
 
 
-def room() -> Wandering:
-    return Wandering(np.array([STD]), POLE, np.array([[0.2], [0.0]]))
+def room() -> RandomAmbients:
+    return RandomAmbients(np.array([STD]), POLE, np.array([[0.2], [0.0]]))
 
 
 def test_the_filter_is_the_inverse_cholesky_factor() -> None:

@@ -34,11 +34,11 @@ from ._unknown_ambients import FoundAmbient as FoundAmbient
 from ._unknown_ambients import found_ambients as found_ambients
 from ._unknown_ambients import too_warm as too_warm
 from ._unknown_ambients import with_unknown_ambients as with_unknown_ambients
-from ._wandering_ambients import wandering as wandering
+from ._wandering_ambients import with_random_ambients as with_random_ambients
 from ._whitened import Whitened as Whitened
 
 __all__ = ["ENOUGH", "FoundAmbient", "LARGEST_FACTOR", "LIMIT", "NoiseScaling", "Point", "Refit", "SessionGain",
            "Sessions", "Structure", "WIDE", "Whitened", "coarsened", "descend", "exact", "exchanged", "extended",
            "filters", "fitted", "found_ambients", "lag_name", "lags_of", "leaves_far_less", "only_heated",
            "orthonormal", "refit", "relinearized", "sessions_of", "structure_of", "too_warm", "turned",
-           "wandering", "with_exchanged_lags", "with_late_means", "with_slow_part", "with_unknown_ambients"]
+           "with_exchanged_lags", "with_late_means", "with_random_ambients", "with_slow_part", "with_unknown_ambients"]

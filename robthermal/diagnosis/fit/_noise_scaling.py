@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from ...fitting import rmse
 from ..data import NoiseEstimate
 from ..effects import conductances
-from ..path import LinearizedRecord, SlowNoise, Wandering, settled_cost
+from ..path import LinearizedRecord, RandomAmbients, SlowNoise, settled_cost
 
 Array = NDArray[np.float64]
-Noise = tuple[Array, Array, SlowNoise | None, Wandering | None]
+Noise = tuple[Array, Array, SlowNoise | None, RandomAmbients | None]
 LARGEST_FACTOR = 1.4  # a free process noise would eat the physics: every level may change by at most this factor
 WIDE = 2.2  # asked only when nothing explains the records: is the declared level itself wrong?
 _CLOSE = 0.03
@@ -111,7 +111,7 @@ class NoiseScaling:
         std = np.minimum(self.share * self.of(path, floor)[0], declared)
         return SlowNoise(std, float(np.exp(-path.h / self.memory)))
 
-    def wandering(self, path: LinearizedRecord) -> Wandering | None:
+    def wandering(self, path: LinearizedRecord) -> RandomAmbients | None:
         """Ambients that the record does not hold; None where all are recorded, or stand still.
 
         Parameters
@@ -121,7 +121,7 @@ class NoiseScaling:
 
         Returns
         -------
-        Wandering or None
+        RandomAmbients or None
         """
         names = [name for name in path.system.ambients if name not in path.one.record.input_names]
         if not (self.wander and names):
@@ -131,7 +131,7 @@ class NoiseScaling:
         for column, name in enumerate(names):
             for lump, slope in conductances(path.system, name).items():
                 G[lumps.index(lump), column] = slope
-        return Wandering(np.full(len(names), self.wander), float(np.exp(-path.h / self.pace)), G)
+        return RandomAmbients(np.full(len(names), self.wander), float(np.exp(-path.h / self.pace)), G)
 
     def noise_of(self, path: LinearizedRecord, floor: NoiseEstimate) -> Noise:
         """All that is random in a record: noise of its sensors, heat, slow part, ambients.

@@ -10,7 +10,7 @@ from ._refitting import fitted
 _CLEAR = 50.0  # by which -2 log likelihood has to fall: a room that stands still is the simpler answer
 
 
-def wandering(fit: Refit) -> Refit | None:
+def with_random_ambients(fit: Refit) -> Refit | None:
     """The same structure refitted with ambients that wander about what it says; None where they need not.
 
     Parameters

@@ -15,8 +15,8 @@ from ._linearized import White as White
 from ._linearized_record import LinearizedRecord as LinearizedRecord
 from ._linearized_response import LinearizedResponse as LinearizedResponse
 from ._linearized_response import linearized_response as linearized_response
+from ._random_ambients import RandomAmbients as RandomAmbients
 from ._riccati import settled as settled
-from ._wandering import Wandering as Wandering
 from ._whitening import SlowNoise as SlowNoise
 from ._whitening import Whitener as Whitener
 from ._whitening import gathered as gathered
@@ -25,6 +25,6 @@ from ._whitening import settled_cost as settled_cost
 from ._whitening import whitener as whitener
 
 __all__ = ["AveragedRecord", "LATE_MEANS", "Linearized", "LinearizedRecord", "LinearizedResponse", "N_SPLINES",
-           "SlowNoise", "Unknowns", "Wandering", "White", "Whitener", "averaged_record", "coarse_names",
+           "SlowNoise", "Unknowns", "RandomAmbients", "White", "Whitener", "averaged_record", "coarse_names",
            "gathered", "heat_splines", "heat_spread", "linearize", "linearized_record", "linearized_records",
            "linearized_response", "settled", "settled_cost", "whitener"]

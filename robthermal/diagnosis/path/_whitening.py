@@ -15,8 +15,8 @@ from scipy.linalg import block_diag, expm
 from ..._recursion import recursion
 from ...thermal import Equations
 from ._filter import compiled_for
+from ._random_ambients import RandomAmbients
 from ._riccati import filtered, settled, spread
-from ._wandering import Wandering
 
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -191,7 +191,7 @@ class Whitener:
 
 
 def whitener(path: LinearSteps, noise: Array, disturbance: Array, slow: SlowNoise | None = None,
-             wandering: Wandering | None = None) -> Whitener:
+             wandering: RandomAmbients | None = None) -> Whitener:
     """Filter along one record.
 
     Parameters
@@ -204,7 +204,7 @@ def whitener(path: LinearSteps, noise: Array, disturbance: Array, slow: SlowNois
         Random heat of every lump [W/√Hz].
     slow : SlowNoise, optional
         On top of the white noise.
-    wandering : Wandering, optional
+    wandering : RandomAmbients, optional
         Ambients that the record does not hold.
     """
     A, C = path.steps[0], path.C
@@ -240,7 +240,7 @@ def gathered(path: LinearSteps, disturbance: Array, M: Array | None = None) -> A
     return Q[kind] if one_by_one else Q
 
 
-def heat_spread(path: LinearSteps, disturbance: Array, wandering: Wandering | None = None) -> Array:
+def heat_spread(path: LinearSteps, disturbance: Array, wandering: RandomAmbients | None = None) -> Array:
     """Mean squares (n_sensors,) of what random heat and ambients do to the readings of a free run [K²].
 
     Parameters
@@ -249,7 +249,7 @@ def heat_spread(path: LinearSteps, disturbance: Array, wandering: Wandering | No
         Linearization along the simulated record.
     disturbance : ndarray, shape (n_lumps,)
         Random heat of every lump [W/√Hz].
-    wandering : Wandering, optional
+    wandering : RandomAmbients, optional
         Ambients that the record does not hold.
     """
     if wandering is None and not disturbance.any():
@@ -263,7 +263,7 @@ def heat_spread(path: LinearSteps, disturbance: Array, wandering: Wandering | No
 
 
 def settled_cost(path: LinearSteps, r: Array, noise: Array, disturbance: Array, slow: SlowNoise | None = None,
-                 wandering: Wandering | None = None) -> float:
+                 wandering: RandomAmbients | None = None) -> float:
     """-2 log likelihood of residuals r (n, n_sensors) under the settled filter at the mean of the linearization.
 
     Good enough for noise levels, and faster than the time-varying filter. Infinite where nothing settles: what no

@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Wandering:
+class RandomAmbients:
     """Distance θ of ambients from what the model says: θ(k+1) = pole θ(k) + n, independent, stationary from the start.
 
     A heat G θ flows into the lumps, constant over every sample (Ornstein and Uhlenbeck 1930: a random walk that is
