@@ -1,4 +1,4 @@
-"""A bar between a heated and a cooled plate, 20 to 500 °C, whose conductivity follows temperature as handbooks say.
+"""A bar between a heated and a cooled plate, 20 to 340 °C, whose conductivity follows temperature as handbooks say.
 
 Sixty cells integrated by scipy's LSODA, with tables of Incropera and DeWitt (Fundamentals of Heat and Mass Transfer,
 tables A.1 and A.4) and linear interpolation: nothing of the package but the record, and no power law.

@@ -6,7 +6,7 @@ from ...diagnosis import Diagnosis, Found, Gap
 from ._change_words import change_in_words, gain_in_words, nothing_changed
 from ._effect_words import in_words, labels_in_words
 
-_SHRUNK = 0.9  # of the error: a larger part that is left is that of a room that was not recorded
+_SHRUNK = 0.9  # of the error: where more is left, free runs beside a room that was not recorded show no gain
 
 
 def answer_sentence(found: Diagnosis) -> str:
@@ -23,9 +23,10 @@ def answer_sentence(found: Diagnosis) -> str:
         said = f"Since the reference records: {accepted_in_words(found)}" if found.reference else (
             f"The model lacks {accepted_in_words(found)}{log}")
         both = f"{gap.before:.2g} to {gap.after:.2g} {gap.unit}"
+        beside = f"With {'it' if len(found.effects) == 1 else 'them'} the error on {records}"
+        falls = f"{beside} falls from {both}."
         if found.fit.levels.wander and gap.after > _SHRUNK * gap.before:
-            both = f"{both}: most of it is the room's"
-        falls = f"With {'it' if len(found.effects) == 1 else 'them'} the error on {records} falls from {both}."
+            falls = f"{beside} goes from {both}: what a room that wanders does is in both."
         return " ".join([f"{said}. {falls}", *_finer(found), *map(labels_in_words, found.caveats)])
     if found.verdict == "consistent":
         if found.reference:
