@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -158,7 +159,7 @@ def test_design_writes_a_complete_folder_and_says_yes(written: Path, run: Run) -
                       "Contraction in the box that is never left", "The observer's error shrinks"]
     cases = ElementTree.parse(out / "junit.xml").findall(".//testcase")
     gates = ["not_certified", "not_verified", "current_beyond_invariance", "not_robust", "margin_missed",
-             "loop_not_robust", "nominal_only"]  # looked for, none failed
+             "loop_not_robust", "setpoint_not_held", "nominal_only"]  # looked for, none failed
     assert [case.get("name") for case in cases] == titles + gates
     assert not [case for case in cases if case.find("failure") is not None]
     assert run("verify", out).status == 0
@@ -307,6 +308,41 @@ def test_the_worst_ambient_counts(bench: rt.System) -> None:
     assert worst == pytest.approx(rt.thermal.fold(bench, {"m1": 285.15}, ambient={"room": 308.15}).current[-1, 0])
     ambient = contain(bench, request, {"m1": (0.0, 1.0)}).invariance.region["ambient"]["room"]
     assert [float(value) for value in ambient] == [288.15, 308.15]
+
+
+def coldest(system: rt.System, heat: float, room: float, most: float) -> float:
+    """Coldest stage in steady state with this heat into the part, over a fine grid of currents [K]."""
+    found = [rt.thermal.steady_state(system, {"m1": current, "room": room}, heat={"part": heat}).equilibria[0]
+             for current in np.linspace(0.0, most, 201)]
+    return min(one.temperatures["stage"] for one in found)
+
+
+@pytest.mark.usefixtures("without_linearity")
+def test_a_heater_that_is_too_strong_for_a_set_point_is_said(bench: rt.System) -> None:
+    """Within its limits it warms the stage beyond what any allowed current takes away: that passed without a word."""
+    strong = bench.with_parameters({"inputs.heater.gain": 12.0})
+    done = rt.jobs.design_system(strong, rt.jobs.design.design_from_text(
+        strong, setpoint=["m1=12"], bandwidth=0.05, sample_time=2.0, ambient=["room=15:30"]))
+    (reason,) = [one for one in rt.jobs.design.design_report(done, ()).reasons if one.code == "setpoint_not_held"]
+    reached = float(re.search(r"m1 reaches ([0-9.]+) °C instead of 12 °C", reason.text)[1])  # type: ignore[index]
+    assert "With room at 30 °C, 6 W into part" in reason.text and reason.level == "remark"
+    assert reached == pytest.approx(coldest(strong, 6.0, 303.15, done.law.current_high[0]) - 273.15, abs=0.05)
+    assert [(one.ambient["room"], one.heat, one.held) for one in done.corners][:3] == [
+        (303.15, {}, True), (288.15, {}, True), (303.15, {"part": 6.0}, False)]
+
+
+@pytest.mark.usefixtures("without_linearity")
+def test_heat_that_is_stated_is_certified_and_must_be_held(bench: rt.System) -> None:
+    wanted = rt.jobs.design.design_from_text(bench, setpoint=["m1=12"], bandwidth=0.05, sample_time=2.0)
+    done = rt.jobs.design_system(bench, replace(wanted, heat={"part": (0.0, 1.5), "box": (0.0, 1.0)}))
+    box = next(one.certificate for one in done.certification.checked if one.key == "box")
+    assert {name: [float(end) for end in pair] for name, pair in box.region["heat"].items()} == {
+        "part": [0.0, 1.5], "box": [0.0, 1.0]}
+    most = done.corners[-1]
+    assert most.heat == {"part": 1.5, "box": 1.0} and most.held and most.reach is not None
+    assert most.reach.current["m1"] > done.reach.current["m1"] + 0.05
+    with pytest.raises(InputError, match=r"m1 at 12 °C cannot be held: .*with 12 W into part"):
+        rt.jobs.design_system(bench, replace(wanted, heat={"part": (0.0, 12.0)}))
 
 
 @pytest.mark.exhaustive

@@ -10,8 +10,9 @@ from ._own_heat import add, through
 from ._sections import Currents, Interval, Temperatures, named_ranges, region_section
 
 
-def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None) -> dict[str, Interval]:
-    """Heat range of every heated lump from the declared limits of the heaters.
+def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None,
+                stated: Mapping[str, Interval] | None = None) -> dict[str, Interval]:
+    """Heat range of every heated lump from the declared limits of the heaters, but for lumps whose heat is stated.
 
     Parameters
     ----------
@@ -20,6 +21,8 @@ def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None
     parameters : mapping, optional
         {parameter name: (lower, upper)}; ranges of the gain of a heater and of what it makes of its column otherwise
         widen the heat, others change nothing.
+    stated : mapping, optional
+        {lump: (lower, upper)} [W] that count instead of the heaters on these lumps.
 
     Returns
     -------
@@ -30,7 +33,7 @@ def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None
     Raises
     ------
     InputError
-        A heater without limits.
+        A heater without limits on a lump whose heat is not stated; a stated range that is none, or of no lump.
 
     Examples
     --------
@@ -43,14 +46,18 @@ def heater_heat(system: System, parameters: Mapping[str, Interval] | None = None
     >>> rt.certify.heater_heat(bar, {"inputs.foil.gain": (1.9, 2.1)})
     {'bar': (0.0, 21.0)}
     """
+    given = _checked(system, stated or {})
     heat: dict[str, Interval] = {}
     others = following(system, parameters)
     for name, heater in system.inputs.items():
         gains = (parameters or {}).get(f"inputs.{name}.gain", (heater.gain, heater.gain))
-        if name not in others and any(gains):  # no heat: the speed of a fan, a force, whatever its limits
-            for lump, pair in through(system, name, heater_range(system, name, parameters), parameters):
-                add(heat, lump, pair)
-    return heat
+        if name in others or not any(gains):  # no heat: the speed of a fan, a force, whatever its limits
+            continue
+        if all(lump in given for lump, _ in through(system, name, (0.0, 1.0), parameters)):
+            continue
+        for lump, pair in through(system, name, heater_range(system, name, parameters), parameters):
+            add(heat, lump, pair)
+    return heat | given
 
 
 def heat_ranges(system: System, heat: Mapping[str, Interval] | None, parameters: Mapping[str, Interval] | None
@@ -58,6 +65,10 @@ def heat_ranges(system: System, heat: Mapping[str, Interval] | None, parameters:
     """Heat into every lump that gets any: as given, checked, or what heaters may give within their limits."""
     if heat is None:
         return heater_heat(system, parameters)
+    return _checked(system, heat)
+
+
+def _checked(system: System, heat: Mapping[str, Interval]) -> dict[str, Interval]:
     return {name: (low, high) for name, (low, high) in named_ranges(heat, system.lump_names, "heat", "lump").items()}
 
 

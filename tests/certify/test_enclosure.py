@@ -48,3 +48,20 @@ def test_an_input_that_heats_nothing_needs_no_limits() -> None:
     assert found.invariance.holds and found.temperature["bar"][1] >= 300.0 + 10.0 / 0.5  # steady state by hand
     with pytest.raises(rt.InputError, match="heater 'fan' has no limits"):
         rt.certify.heater_heat(system, {"inputs.fan.gain": (0.0, 1.0)})
+
+
+def test_heat_that_is_stated_counts_for_its_lump_alone() -> None:
+    """A project that stated the heat of one lump had all other heaters off, without a word."""
+    system = rt.System(ambients={"room": {"temperature": 295.0}},
+                       lumps={"bar": {"capacity": 50.0}, "plate": {"capacity": 50.0}},
+                       links=[{"between": ("bar", "room"), "conductance": 0.5},
+                              {"between": ("bar", "plate"), "conductance": 0.5}],
+                       inputs={"foil": {"lump": "bar", "limits": (0.0, 10.0)},
+                               "lamp": {"lump": "plate", "gain": 2.0, "limits": (0.0, 3.0)},
+                               "spare": {"lump": "bar"}})
+    stated = rt.certify.heater_heat(system, stated={"bar": (0.0, 4.0)})
+    assert stated == {"bar": (0.0, 4.0), "plate": (0.0, 6.0)}  # spare, without limits, heats the bar alone
+    with pytest.raises(rt.InputError, match="heater 'spare' has no limits"):
+        rt.certify.heater_heat(system, stated={"plate": (0.0, 4.0)})
+    with pytest.raises(rt.InputError, match="barr"):
+        rt.certify.heater_heat(system, stated={"barr": (0.0, 4.0)})

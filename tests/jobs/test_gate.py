@@ -100,6 +100,46 @@ def _still(folder: Path) -> bool:
     return bool((folder / "still.csv").write_text("\n".join(["time,Q,T", *rows])))
 
 
+@pytest.mark.parametrize(("stated", "codes_of"), [
+    ("heat = { bar = [0.0, 8.0] }", set()), ("", set()),
+    ("heat = { bar = [0.0, 5.0] }", {("heater_beyond_claim", "bar"), ("records_beyond_claim", "Q")})])
+def test_claims_about_less_heat_than_heaters_give_are_remarked(stated: str, codes_of: set[tuple[str, str]],
+                                                               tmp_path: Path) -> None:
+    """8 W by its limits and in the records: a claim about 5 W was a pass without a word."""
+    result = bar(tmp_path, project=PROJECT.replace("heat = { bar = [0.0, 8.0] }", stated))
+    said = [one for one in result.reasons if one.code in ("heater_beyond_claim", "records_beyond_claim")]
+    assert {(one.code, one.about) for one in said} == codes_of and all(one.level == "remark" for one in said)
+    assert all("8 W" in one.text and "0 to 5 W into bar" in one.text for one in said)
+
+
+def test_a_heater_of_another_lump_than_the_stated_one_counts(tmp_path: Path) -> None:
+    more = SYSTEM.replace("[sensors.T]", """
+[lumps.lid]
+capacity = 20.0
+initial = 20.0
+[[links]]
+between = ["lid", "bar"]
+conductance = 0.3
+[sensors.T]""")
+    result = bar(tmp_path, system=more, project=PROJECT.replace("heat = { bar =", "heat = { lid ="))
+    box = next(one.certificate for one in result.certification.checked if one.key == "box")
+    assert {name: float(high) for name, (_, high) in box.region["heat"].items()} == {"lid": 8.0, "bar": 8.0}
+
+
+def test_a_room_outside_of_what_is_claimed_is_remarked(tmp_path: Path) -> None:
+    time, records = np.arange(600.0), {}
+    for name, share in (("train", 1.0), ("validation", 0.3)):
+        records[name] = np.full(600, 100 * share), ROOM + closed_form(time, share)
+    file = write_project(tmp_path, records, project=PROJECT.replace("ambient = { room = [19.0, 21.0] }", ""))
+    for csv in ("train.csv", "validation.csv"):
+        head, *rows = (tmp_path / csv).read_text(encoding="utf-8").splitlines()
+        warm = [f"{row},{20.0 + 3.0 * k / (len(rows) - 1):.3f}" for k, row in enumerate(rows)]
+        (tmp_path / csv).write_text("\n".join([f"{head},room", *warm]) + "\n", encoding="utf-8")
+    result = rt.jobs.run_job(rt.jobs.read_project(file))
+    (said,) = [one for one in result.reasons if one.code == "records_beyond_claim"]
+    assert said.text == "The claims are about room at exactly 20 °C; the records hold 20 to 23 °C."
+
+
 def test_what_the_data_leave_open_is_said_and_decides_where_a_claim_depends_on_it(tmp_path: Path) -> None:
     open_ = SYSTEM + '"inputs.Q.gain" = { lower = 0.01, upper = 1.0 }\n'  # only ratios are determined
     result = bar(tmp_path, system=open_)

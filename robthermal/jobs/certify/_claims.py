@@ -12,6 +12,7 @@ from ...certify import (
     Runaway,
     RunawayFree,
     contraction,
+    heater_heat,
     largest_regulated_current,
     runaway,
     runaway_free,
@@ -65,15 +66,15 @@ def certify_system(system: System, boxes: Boxes, progress: Callable[[str], None]
     """
     if parameters is None and not isinstance(boxes.parameters, str):
         parameters = boxes.parameters
-    current, heat = _currents(system, boxes), boxes.heat
+    current = _currents(system, boxes)
     progress("certifying the temperature box, and that no trajectory leaves its box")
-    nominal, safe = _required(system, boxes, current, heat)
+    nominal, safe = _required(system, boxes, current)
     found = list(nominal.values())
     if parameters:
         progress("certifying the same for the parameter ranges")
-        robust = _robust(system, boxes, current, heat, parameters, nominal)
+        robust = _robust(system, boxes, current, parameters, nominal)
         found = [one for key in nominal for one in (nominal[key], robust.get(key)) if one is not None]
-    rows, limits = usable_currents(system, boxes, current, heat, parameters, progress)
+    rows, limits = usable_currents(system, boxes, current, parameters, progress)
     fold: Runaway | None = None
     optional = [Checked(key, title, certificate, None, False) for key, title, certificate in limits]
     if boxes.setpoint:
@@ -101,22 +102,23 @@ def claims_hold(system: System, boxes: Boxes, parameters: Ranges) -> bool:
     parameters : mapping
         {parameter: (lower, upper)}.
     """
-    box, safe = _claims(system, boxes, _currents(system, boxes), boxes.heat, parameters)
+    box, safe = _claims(system, boxes, _currents(system, boxes), parameters)
     return box.holds and safe.holds
 
 
-def _claims(system: System, boxes: Boxes, current: Mapping[str, Any], heat: Mapping[str, Any] | None,
-            parameters: Ranges | None) -> tuple[Certificate, RunawayFree]:
+def _claims(system: System, boxes: Boxes, current: Mapping[str, Any], parameters: Ranges | None
+            ) -> tuple[Certificate, RunawayFree]:
     norm: dict[str, Any] = {"method": boxes.method, "structure": boxes.structure, "large": boxes.large,
                             "parameters": parameters}
     box = contraction(system, current=current, temperature=boxes.temperature, **norm)
-    return box, runaway_free(system, current=current, ambient=boxes.ambient, heat=heat, **norm)
+    return box, runaway_free(system, current=current, ambient=boxes.ambient,
+                             heat=heater_heat(system, parameters, boxes.heat), **norm)
 
 
-def _required(system: System, boxes: Boxes, current: Mapping[str, Any], heat: Mapping[str, Any] | None,
-              parameters: Ranges | None = None) -> tuple[dict[str, Checked], RunawayFree]:
+def _required(system: System, boxes: Boxes, current: Mapping[str, Any], parameters: Ranges | None = None
+              ) -> tuple[dict[str, Checked], RunawayFree]:
     """Required claims by key, as yet without their checks."""
-    box, safe = _claims(system, boxes, current, heat, parameters)
+    box, safe = _claims(system, boxes, current, parameters)
     found = {"contraction": box, "box": safe.invariance}
     if safe.contraction is not safe.invariance:
         found["box_contraction"] = safe.contraction
@@ -126,13 +128,13 @@ def _required(system: System, boxes: Boxes, current: Mapping[str, Any], heat: Ma
             for key, certificate in found.items()}, safe
 
 
-def _robust(system: System, boxes: Boxes, current: Mapping[str, Any], heat: Mapping[str, Any] | None,
-            parameters: Ranges, nominal: Mapping[str, Checked]) -> dict[str, Checked]:
+def _robust(system: System, boxes: Boxes, current: Mapping[str, Any], parameters: Ranges,
+            nominal: Mapping[str, Checked]) -> dict[str, Checked]:
     """The same for all parameters in their ranges, with the parameter that breaks what holds without the ranges."""
-    found, _ = _required(system, boxes, current, heat, parameters)
+    found, _ = _required(system, boxes, current, parameters)
 
     def holds(key: str, ranges: Ranges) -> bool:
-        again, _ = _required(system, boxes, current, heat, ranges)
+        again, _ = _required(system, boxes, current, ranges)
         return key in again and again[key].certificate.holds
 
     return {key: one if one.certificate.holds or not nominal[key].certificate.holds else replace(

@@ -7,7 +7,7 @@ from dataclasses import replace
 from math import isfinite
 from typing import Literal
 
-from ...certify import UsableCurrent, usable_current
+from ...certify import UsableCurrent, heater_heat, usable_current
 from ...report import Bound, Reason, UsableRange, rounded_down
 from ...thermal import System
 from ...verification import Certificate
@@ -30,7 +30,7 @@ def directions(current: Pairs) -> tuple[Direction, ...]:
     return ("cooling", "heating", "symmetric") if both else ("cooling", "heating")
 
 
-def usable_currents(system: System, boxes: Boxes, current: Pairs, heat: Pairs | None, parameters: Pairs | None,
+def usable_currents(system: System, boxes: Boxes, current: Pairs, parameters: Pairs | None,
                     progress: Callable[[str], None]) -> tuple[list[UsableRange], list[Found]]:
     """Usable currents of all directions, with certificates; for the parameter ranges too where there are some."""
     rows: list[UsableRange] = []
@@ -39,7 +39,8 @@ def usable_currents(system: System, boxes: Boxes, current: Pairs, heat: Pairs | 
         for ranges in (None, parameters) if parameters else (None,):
             progress(f"searching the usable {direction} current{', for the parameter ranges' * (ranges is not None)}")
             best = usable_current(system, direction=direction, temperature=boxes.temperature, ambient=boxes.ambient,
-                                  heat=heat, setpoint=boxes.setpoint or None, parameters=ranges,
+                                  heat=heater_heat(system, ranges, boxes.heat), setpoint=boxes.setpoint or None,
+                                  parameters=ranges,
                                   lower="inside" if boxes.temperature_lower == "held" else "reported",
                                   method="energy" if boxes.method == "lyapunov" else boxes.method)
             rows.append(_row(best, direction, ranges is not None, system.module_names))

@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from ..._celsius import ZERO_CELSIUS
+from ...certify import heater_heat
 from ...report import Reason
 from ..claims import Certification, GateCode
 from ._currents import CODES, box_stays_inside, current_reasons, within_usable
 
-CERTIFY_GATES = tuple(code.code for code in (*CODES.values(), GateCode.BOX_BEYOND_TEMPERATURE, GateCode.NOMINAL_ONLY))
+CERTIFY_GATES = tuple(code.code for code in (*CODES.values(), GateCode.BOX_BEYOND_TEMPERATURE,
+                                           GateCode.HEATER_BEYOND_CLAIM, GateCode.NOMINAL_ONLY))
+
+
+_SLIGHT = 1e-6  # of a range: rounding
 
 
 def certification_reasons(result: Certification, measured: Mapping[str, tuple[float, float]] | None = None
@@ -25,6 +30,7 @@ def certification_reasons(result: Certification, measured: Mapping[str, tuple[fl
     """
     found = [*current_reasons(result.current, measured or {}, result.usable, box_inside(result))]
     found.extend(_hotter_than_stated(result))
+    found.extend(_heaters_beyond(result))
     if result.parameters is None:
         found.append(remark(GateCode.NOMINAL_ONLY, "certify", "parameters", GateCode.NOMINAL_ONLY.meaning))
     return tuple(found)
@@ -42,6 +48,18 @@ def _hotter_than_stated(result: Certification) -> Iterator[Reason]:
         text = (f"With the stated heats and ambients the machine is certified to stay below "
                 f"{hottest - ZERO_CELSIUS:.1f} °C, not below the stated {stated - ZERO_CELSIUS:.1f} °C.")
         yield remark(GateCode.BOX_BEYOND_TEMPERATURE, "certify", "temperature", text, hottest, stated)
+
+
+def _heaters_beyond(result: Certification) -> Iterator[Reason]:
+    """Heaters whose declared limits go beyond the heat that is stated for their lump."""
+    stated, system = result.boxes.heat or {}, result.system
+    unknown = {lump: (0.0, 0.0) for one in system.inputs.values() if one.limits is None
+               for lump in (one.lump, *([one.feedthrough.lump] if one.feedthrough else []))}
+    for lump, (low, high) in heater_heat(system, stated=unknown).items() if stated else ():
+        least, most = stated.get(lump, (low, high))
+        if lump not in unknown and (high > most + _SLIGHT * abs(most) or low < least - _SLIGHT * abs(least)):
+            yield remark(GateCode.HEATER_BEYOND_CLAIM, "certify", lump, f"The claims are about {least:g} to {most:g} W "
+                         f"into {lump}; by their limits its heaters may give {low:.4g} to {high:.4g} W.", high, most)
 
 
 def box_inside(result: Certification) -> bool:

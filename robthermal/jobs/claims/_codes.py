@@ -46,6 +46,10 @@ class GateCode(Enum):
     BOX_BEYOND_TEMPERATURE = ("The box that is certified never to be left reaches above the stated temperatures: with "
                               "the stated heats and ambients the machine may get hotter than stated.",
                               "Narrow [certify] heat or ambient, or raise [certify] temperature.")
+    HEATER_BEYOND_CLAIM = ("A heater may give more within its limits than the claims allow for.",
+                           "Widen [certify] heat, or see to it that the heater never gives more.")
+    RECORDS_BEYOND_CLAIM = ("An ambient or a heater of the records is outside the range that the claims are about.",
+                            "Give [certify] ambient and heat what the machine meets.")
     OUTSIDE_DATA = ("A claim reaches beyond what the records hold.",
                     "Measure there, or narrow what is claimed.")
     SIMULATED_DATA = ("The records are simulated: they say nothing about a machine.", "Replace them by measurements.")
@@ -64,6 +68,9 @@ class GateCode(Enum):
                      "Ask for less bandwidth or margin; the reason says how much bandwidth is possible.")
     LOOP_NOT_ROBUST = ("A loop is unstable, or cannot hold its set-point, for some parameters in their ranges.",
                        "Ask for less bandwidth, move the set-points, or measure the parameter that is named better.")
+    SETPOINT_NOT_HELD = ("Set-points cannot be held at all heats that the heaters may give within their limits.",
+                         "State the heats that the machine meets, [certify] heat; move the set-points, or cool the hot "
+                         "side better.")
     AT_THE_BINS = ("The controller was judged at the bins of a measured response only, in floating point: that the "
                    "loop is stable is not proven.", "Give a model of the plant for a proof; step the loop with care.")
     REPORT_CHANGED = ("report.json is not what the job wrote.", "Run the job again.")

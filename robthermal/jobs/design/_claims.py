@@ -40,7 +40,8 @@ def certified_design(system: System, request: DesignRequest, pairs: Pairs, watch
     found += [Checked(f"runaway_{name}", f"Closed form of {name}, constant properties (not the network)", cert, None,
                       False) for name, cert in fold.certificates.items()]
     checked = tuple(replace(one, verdict=verify(one.certificate) if one.certificate.holds else None) for one in found)
-    boxes = Boxes(request.temperature, request.ambient, pairs, None, coldest_faces(system, request), request.method)
+    boxes = Boxes(request.temperature, request.ambient, pairs, request.heat, coldest_faces(system, request),
+                  request.method)
     return Certification(system, boxes, checked, certified, fold, safe, (), request.parameters), robust
 
 

@@ -29,13 +29,14 @@ from ...errors import InputError
 from ...thermal import System, drivable_range
 from ..claims import Certification
 from ._claims import certified_design, certified_observer
+from ._corners import Corner, corners, first_missed
 from ._limits import (
     Pairs,
-    ambient_ends,
     candidates,
     certified_limits,
     check_given,
     hottest,
+    what_limits,
     worst_runaway,
 )
 from ._loops import BANDWIDTH as _BANDWIDTH
@@ -80,6 +81,9 @@ class ControllerDesign:
         The box that is never left for all parameters in their ranges; None without ranges.
     tuning : str
         How the bandwidth was found, where it was tuned.
+    corners : tuple of Corner
+        Whether the set-points are held at the ends of ambients and heats, and what they need there; `reach` is the
+        first.
     """
 
     request: DesignRequest
@@ -95,6 +99,7 @@ class ControllerDesign:
     missed: tuple[str, ...] = ()
     robust: RunawayFree | None = None
     tuning: str = ""
+    corners: tuple[Corner, ...] = ()
 
     @property
     def points(self) -> dict[str, RegulatedPoint]:
@@ -153,9 +158,8 @@ def design_system(system: System, request: DesignRequest,
     free = feedback_linearization(system, current_limits=_asked(system, request))  # refusals before the long work
     plant = cold_side(free, regulate=request.regulate)
     kalman = _kalman(system, request)
-    possible, at = _reach(free, request)
-    if not possible.outcome:
-        raise _refusal(possible, free, request, at, "by the system file or the request")
+    if (missed := first_missed(free, request)) is not None:
+        raise _refusal(missed, free, request, "by the system file or the request")
     if request.bandwidth is not None or request.margins is None:
         pid(plant, bandwidth=request.bandwidth or _BANDWIDTH, sample_time=request.sample_time)
     progress("searching the runaway limit")
@@ -164,7 +168,9 @@ def design_system(system: System, request: DesignRequest,
     certified = certified_limits(system, request)
     check_given(system, request, fold, certified)
     progress("choosing the current limits")
-    law, reach = _law(system, request, candidates(system, request, fold, certified))
+    law = _law(system, request, candidates(system, request, fold, certified))
+    found = corners(law, request)
+    reach = reachable(law, request.setpoint, inputs=found[0].ambient, regulate=request.regulate)
     pairs = {name: (float(low), float(high)) for name, low, high in
              zip(law.names, law.current_low, law.current_high, strict=True)}
     progress("certifying the observer")
@@ -180,7 +186,7 @@ def design_system(system: System, request: DesignRequest,
     progress("comparing steps with and without the feedback law")
     return ControllerDesign(request, certification, law, loops.controller, watcher, reach, loop,
                             _collapse(law, loops, request, reach), loops.margins, loops.bandwidth, loops.missed, robust,
-                            loops.tuning)
+                            loops.tuning, found)
 
 
 def _asked(system: System, request: DesignRequest) -> Pairs:
@@ -189,16 +195,13 @@ def _asked(system: System, request: DesignRequest) -> Pairs:
     return {name: (request.current or {}).get(name, (one.low, one.high)) for name, one in declared.items()}
 
 
-def _reach(law: FeedbackLinearization, request: DesignRequest) -> tuple[Reachable, dict[str, float]]:
-    """Whether the set-points are held, and in which ambients; an end of their ranges where they are not, if any."""
-    found = [(reachable(law, request.setpoint, inputs=at, regulate=request.regulate), at)
-             for at in ambient_ends(request)]
-    return next((pair for pair in found if not pair[0].outcome), found[0])
-
-
-def _refusal(r: Reachable, law: FeedbackLinearization, request: DesignRequest, at: dict[str, float],
-             limits: str) -> InputError:
+def _refusal(missed: Corner, law: FeedbackLinearization, request: DesignRequest, limits: str,
+             remedy: str = "Move the set-points, or cool the hot side better.") -> InputError:
     """Set-points that cannot be held, in the words of the command line."""
+    r = missed.reach
+    if r is None:
+        return InputError(f"with {missed} no set-point can be held: {missed.why}", where="--setpoint",
+                          remedy="State less heat, or cool the hot side better.")
     reason = "the hot side runs away" if r.binding == "runaway" else f"the {r.binding} limit is reached"
     drivable = {name: drivable_range(module, request.temperature) for name, module in law.system.modules.items()
                 if module.supply is not None and r.binding == "current"}
@@ -207,28 +210,24 @@ def _refusal(r: Reachable, law: FeedbackLinearization, request: DesignRequest, a
         ends = {name: high if r.current[name] > 0 else low
                 for name, low, high in zip(law.names, law.current_low, law.current_high, strict=True)}
         reason += f", {', '.join(f'{name} {value:.4g} A' for name, value in ends.items())} {limits}"
-    reason += "".join(f", with {name} at {celsius(value)}" for name, value in at.items())
+    reason += f", with {missed}" if str(missed) else ""
     ranges = "; ".join(f"{name} {celsius(min(r.passive[name], r.limit[name]))} to "
                        f"{celsius(max(r.passive[name], r.limit[name]))}" for name in r.setpoint)
     wanted = ", ".join(f"{name} at {celsius(value)}" for name, value in r.setpoint.items())
     return InputError(f"{wanted} cannot be held: {reason}", where="--setpoint",
-                      expected=f"within the reachable range, {ranges}",
-                      remedy="Move the set-points, or cool the hot side better.")
+                      expected=f"within the reachable range, {ranges}", remedy=remedy)
 
 
-def _over(request: DesignRequest) -> str:
-    """What the certificates are about."""
-    return ", for the ranges of the parameters" if request.parameters else ""
-
-
-def _law(system: System, request: DesignRequest, tried: Iterator[Pairs]) -> tuple[FeedbackLinearization, Reachable]:
+def _law(system: System, request: DesignRequest, tried: Iterator[Pairs]) -> FeedbackLinearization:
     """Law with the first of the limits that hold the set-points."""
+    refusal = InputError("no current limit is possible", where="design")
     for pairs in tried:
         law = feedback_linearization(system, current_limits=pairs)
-        reach, at = _reach(law, request)
-        if reach.outcome:
-            return law, reach
-    raise _refusal(reach, law, request, at, "by runaway limit, certificates and system file" + _over(request))
+        missed = first_missed(law, request)
+        if missed is None:
+            return law
+        refusal = _refusal(missed, law, request, *what_limits(system, request))
+    raise refusal
 
 
 def _reference(law: FeedbackLinearization, request: DesignRequest, settling: float) -> tuple[np.ndarray, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from math import trunc
 from typing import Any
 
@@ -27,6 +28,8 @@ from ._request import DesignRequest
 
 Pairs = dict[str, tuple[float, float]]
 Ranges = Mapping[str, tuple[float, float]] | None
+_BY = {"contraction": "contraction", "box": "the box that is never left", "runaway": "thermal runaway",
+       "rating": "the declared rating"}
 BELOW_FOLD = 0.98  # of I*: at the fold itself the loop has no gain left
 _FINE = 0.01  # of a range
 
@@ -121,8 +124,22 @@ def check_given(system: System, request: DesignRequest, fold: Runaway,
 def usable_cooling(system: System, request: DesignRequest) -> UsableCurrent:
     """Usable cooling current at the set-points, for the parameter ranges where there are some."""
     return usable_current(system, temperature=request.temperature, ambient=request.ambient,
+                          heat=heater_heat(system, request.parameters, request.heat),
                           setpoint=held_faces(system, request), lower="reported", method=_fast(request),
                           parameters=request.parameters)
+
+
+def what_limits(system: System, request: DesignRequest) -> tuple[str, str]:
+    """What the current limits come from, and what to do where they are too small; ranges of parameters by name."""
+    better = "Move the set-points, or cool the hot side better."
+    if not request.parameters:
+        return "by runaway limit, certificates and system file", better
+    nominal, found = usable_cooling(system, replace(request, parameters=None)), usable_cooling(system, request)
+    said = (f"usable for all parameters in their ranges, limited by {_BY[found.limited_by]}; at the parameters as they "
+            f"stand {nominal.current:.4g} A")
+    if not found.limiting_parameter:
+        return said, better
+    return said, f"Measure {found.limiting_parameter} better. {better}"
 
 
 def _fast(request: DesignRequest) -> Method:
@@ -176,8 +193,9 @@ def _share(holds: Callable[[float], bool]) -> float:
 
 def contain(system: System, request: DesignRequest, pairs: Pairs, parameters: Ranges = None) -> RunawayFree:
     """The claim that a box is never left with these currents."""
-    return runaway_free(system, current=pairs, ambient=request.ambient, heat=heater_heat(system, parameters),
-                        method=request.method, parameters=parameters)
+    return runaway_free(system, current=pairs, ambient=request.ambient,
+                        heat=heater_heat(system, parameters, request.heat), method=request.method,
+                        parameters=parameters)
 
 
 def contract(system: System, request: DesignRequest, pairs: Pairs, parameters: Ranges = None) -> Certificate:

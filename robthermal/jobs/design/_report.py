@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +21,12 @@ from ..folder import output_folder
 from ..now import now
 from ..provenance import provenance, simulated_label, subtitle
 from ._claims import OBSERVER_RANGES
+from ._corners import Corner
 from ._design import ControllerDesign
 from ._file import write_design_file
 from ._limits import BELOW_FOLD
 from ._margin_section import margin_section
+from ._request import celsius
 
 _ENDINGS = {"c": ("c", "h"), "mat": ("mat",), "json": ("json",)}
 _LARGEST_GAIN = 6  # sensors whose gains are tabulated; all are in design.json
@@ -143,7 +145,7 @@ _ASSUMPTIONS = (
 
 _GATES = tuple(code.code for code in (GateCode.NOT_CERTIFIED, GateCode.NOT_VERIFIED, GateCode.CURRENT_BEYOND_INVARIANCE,
                                       GateCode.NOT_ROBUST, GateCode.MARGIN_MISSED, GateCode.LOOP_NOT_ROBUST,
-                                      GateCode.NOMINAL_ONLY))
+                                      GateCode.SETPOINT_NOT_HELD, GateCode.NOMINAL_ONLY))
 
 
 def _reasons(result: ControllerDesign) -> Iterator[Reason]:
@@ -154,6 +156,11 @@ def _reasons(result: ControllerDesign) -> Iterator[Reason]:
     if not result.margins.outcome:
         yield Reason("fail", GateCode.LOOP_NOT_ROBUST.code, "design", "margins", result.margins.outcome.text,
                      GateCode.LOOP_NOT_ROBUST.remedy)
+    for corner in result.corners:
+        if not corner.held:
+            yield Reason("remark", GateCode.SETPOINT_NOT_HELD.code, "design", "setpoint", _not_held(corner),
+                         GateCode.SETPOINT_NOT_HELD.remedy)
+            break
     box = (result.robust or result.certification.safe).temperature
     if box and not result.contained:
         lump, (_, high) = max(box.items(), key=lambda item: item[1][1])
@@ -172,6 +179,16 @@ def _reasons(result: ControllerDesign) -> Iterator[Reason]:
     if not result.request.parameters:
         yield Reason("remark", GateCode.NOMINAL_ONLY.code, "design", "parameters", GateCode.NOMINAL_ONLY.meaning,
                      "Give --parameters with the calibrated.json of a calibration, or with ranges.")
+
+
+def _not_held(corner: Corner) -> str:
+    if corner.reach is None:
+        return f"With {corner} no set-point can be held: {corner.why}."
+    r = corner.reach
+    why = "the hot side runs away" if r.binding == "runaway" else f"the {r.binding} limit is reached"
+    reached = ", ".join(f"{name} reaches {celsius(value)} instead of {celsius(r.setpoint[name])}"
+                        for name, value in r.limit.items())
+    return f"With {corner} the set-points cannot be held: {why}, {reached}."
 
 
 def _sections(result: ControllerDesign) -> Iterator[Section]:
@@ -194,10 +211,22 @@ def _numbers(result: ControllerDesign) -> Iterator[tuple[str, str, str]]:
     law, needed = result.law, result.reach.current
     for name, low, high in zip(law.names, law.current_low, law.current_high, strict=True):
         yield (f"current of {name} that holds its set-point", f"{in_table(needed[name], 3)} A",
-               f"computed; the controller keeps to {inward(float(low), float(high))} A")
+               f"computed{_with_heat(result.corners, name)}; the controller keeps to "
+               f"{inward(float(low), float(high))} A")
     least, loop = min((result.margins.worst(loop).phase, loop) for loop in result.margins.loops)
     yield ("least phase margin", f"{least:.3g}°" if np.isfinite(least) else "no crossover",
            f"loop of {loop}; computed, not proven")
+
+
+def _with_heat(corners: Sequence[Corner], name: str) -> str:
+    """What a module needs beside the heats that may flow, in words; empty where nothing heats."""
+    reached = [one.reach for one in corners if one.held and one.reach is not None]
+    if not any(one.heat for one in corners):
+        return ""
+    if len(reached) < len(corners):
+        return " without heat; not held at every heat"
+    most = max((one.current[name] for one in reached), key=abs)
+    return f" without heat; {in_table(most, 3)} A at most with it"
 
 
 def _controller_section(result: ControllerDesign) -> Section:

@@ -57,6 +57,9 @@ class DesignRequest:
     setpoint_ramp : dict
         Module to the largest rate of its set-point, up and down [K/s], every module; default steps. Nothing that is
         certified depends on it.
+    heat : dict
+        Lump to the heat into it, (lower, upper) [W], instead of what the limits of its heaters allow. The set-points
+        must be held at both ends.
 
     Examples
     --------
@@ -79,6 +82,7 @@ class DesignRequest:
     export: tuple[str, ...] = ()
     parameters: dict[str, tuple[float, float]] | None = None
     setpoint_ramp: dict[str, float] | None = None
+    heat: dict[str, tuple[float, float]] | None = None
 
     def ramp(self, modules: Sequence[str]) -> SetpointRamp | None:
         """Rates at which the set-points move; None where they step.

@@ -98,7 +98,7 @@ def design_from_table(system: System, table: Mapping[str, Any], boxes: Boxes,
         Its keys: regulate, setpoint, bandwidth, current, sample_time, sensors, method, margins, export,
         setpoint_ramp; set-points in the unit of the system file.
     boxes : Boxes
-        Box of temperatures, ambients and set-points of [certify], which count where the table has none [K].
+        Box of temperatures, ambients and heats of [certify], and its set-points where the table has none [K, W].
     parameters : mapping, optional
         Ranges of uncertain parameters, each in its unit.
 
@@ -138,7 +138,7 @@ def design_from_table(system: System, table: Mapping[str, Any], boxes: Boxes,
         margins=margins or None, export=formats(_texts(table.get("export", ()), "export")),
         parameters=dict(parameters) if parameters else None,
         setpoint_ramp={name: _number(value, f"setpoint_ramp.{name}")
-                       for name, value in _table(table, "setpoint_ramp").items()} or None)
+                       for name, value in _table(table, "setpoint_ramp").items()} or None, heat=boxes.heat)
     request.check(system)
     return request
 

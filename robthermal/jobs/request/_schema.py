@@ -102,7 +102,7 @@ class Boxes:
     temperature : tuple of float
         Box of the current limits [K].
     ambient, current, heat : dict
-        Ranges by name [K], [A], [W]; `heat` None means the heaters' declared limits.
+        Ranges by name [K], [A], [W]; lumps that `heat` does not name get what their heaters' declared limits allow.
     setpoint : dict
         Regulated cold faces [K].
     method : str

@@ -18,6 +18,7 @@ from ._misfit import Misfit
 from ._result import Doubted, JobResult
 
 _FAR, _SHARE = 10.0, 0.2  # K, and part of a current, that a claim may reach beyond the records
+_WARMER, _MORE = 0.5, 0.02  # K, and part of a heat, that the records may be outside of a claim
 _LOOK = "Find what the model lacks with `robthermal diagnose`;"  # of the remedy for a misfit
 _OF_CLAIMS = (GateCode.NOT_CERTIFIED, GateCode.NOT_VERIFIED, GateCode.NOT_ROBUST)  # the cases of the claims say these
 GATES = tuple(code.code for code in GateCode if code not in (*_OF_CLAIMS, GateCode.REPORT_CHANGED))
@@ -87,6 +88,7 @@ def claim_reasons(certification: Certification, doubted: Sequence[Doubted], fact
     yield from _parameters(doubted)
     yield from certification_reasons(certification, facts.currents(certification.system))
     yield from _outside(certification, facts)
+    yield from _beyond_claims(certification, facts)
 
 
 def _misfits(misfits: Sequence[Misfit], diagnosed: bool) -> Iterator[Reason]:
@@ -145,8 +147,8 @@ def _parameters(doubted: Sequence[Doubted]) -> Iterator[Reason]:
         code = codes[what]
         words = {"undetermined": f"The records do not determine {name}",
                  "bound": f"{name} ended at a bound of [fit]"}[what]
-        then = "the required claims hold on its whole [fit] range" if holds else (
-            "the required claims do not hold on its whole [fit] range")
+        then = (f"the required claims {'hold' if holds else 'do not hold'} on its whole [fit] range, with the other "
+                "parameters as they stand")
         yield Reason("remark" if holds else "fail", code.code, "calibrate", name, f"{words}; {then}.", code.remedy)
 
 
@@ -172,3 +174,22 @@ def _outside(certification: Certification, facts: DataFacts) -> Iterator[Reason]
         if most > max(high, 0.0) + share or least < min(low, 0.0) - share:
             yield remark(GateCode.OUTSIDE_DATA, "certify", name, f"The claims are about {least:g} to {most:g} A of "
                          f"{name}; the records hold {low:.3g} to {high:.3g} A.")
+
+
+def _beyond_claims(certification: Certification, facts: DataFacts) -> Iterator[Reason]:
+    """Ambients and heaters that were outside of what the claims allow for while the records were taken."""
+    system, boxes, measured = certification.system, certification.boxes, facts.inputs or {}
+    for name, one in system.ambients.items():
+        least, most = (boxes.ambient or {}).get(name, (one.temperature, one.temperature))
+        low, high = measured.get(name, (least, most))
+        if max(least - low, high - most) > _WARMER:
+            claimed = (f"exactly {most - ZERO_CELSIUS:.4g} °C" if least == most else
+                       f"{least - ZERO_CELSIUS:.4g} to {most - ZERO_CELSIUS:.4g} °C")
+            yield remark(GateCode.RECORDS_BEYOND_CLAIM, "certify", name, f"The claims are about {name} at {claimed}; "
+                         f"the records hold {low - ZERO_CELSIUS:.4g} to {high - ZERO_CELSIUS:.4g} °C.")
+    for name, heater in system.inputs.items():
+        least, most = (boxes.heat or {}).get(heater.lump, (-np.inf, np.inf))
+        heats = [heater.gain * end for end in measured.get(name, (0.0, 0.0))]
+        if max(heats) > most + _MORE * abs(most) or min(heats) < min(least, 0.0) * (1.0 + _MORE):
+            yield remark(GateCode.RECORDS_BEYOND_CLAIM, "certify", name, f"The claims are about {least:g} to {most:g} "
+                         f"W into {heater.lump}; in the records {name} gives {min(heats):.4g} to {max(heats):.4g} W.")

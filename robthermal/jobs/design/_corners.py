@@ -1,0 +1,99 @@
+"""Whether set-points are held at the ends of ambients and heats, and what current they need there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...certify import heater_heat
+from ...design import FeedbackLinearization, Reachable, reachable
+from ...errors import InputError
+from ...thermal import System
+from ._limits import ambient_ends
+from ._request import DesignRequest, celsius
+
+
+@dataclass(frozen=True)
+class Corner:
+    """Set-points at one end of the ranges of ambients and heats.
+
+    Parameters
+    ----------
+    ambient : dict
+        Ambient to its temperature [K]; the others are nominal.
+    heat : dict
+        Lump to the heat into it [W]; empty while nothing heats.
+    reach : Reachable or None
+        How far the set-points are held, and with which currents; None where there is no steady state to start from.
+    why : str
+        What stands against that.
+    """
+
+    ambient: dict[str, float]
+    heat: dict[str, float]
+    reach: Reachable | None
+    why: str = ""
+
+    @property
+    def held(self) -> bool:
+        """Whether the set-points are held."""
+        return self.reach is not None and bool(self.reach.outcome)
+
+    def __str__(self) -> str:
+        parts = [f"{name} at {celsius(value)}" for name, value in self.ambient.items()]
+        parts += [f"{value:.4g} W into {name}" for name, value in self.heat.items()]
+        return ", ".join(parts)
+
+
+def corners(law: FeedbackLinearization, request: DesignRequest) -> tuple[Corner, ...]:
+    """Set-points at the ends of the ambients' ranges, without heat and with the least and the most that may flow.
+
+    Parameters
+    ----------
+    law : FeedbackLinearization
+        Its system and current limits.
+    request : DesignRequest
+        Set-points, ranges of ambients and heats.
+    """
+    return tuple(_corner(law, request, at, heat) for heat in ({}, *heat_ends(law.system, request))
+                 for at in ambient_ends(request))
+
+
+def first_missed(law: FeedbackLinearization, request: DesignRequest) -> Corner | None:
+    """The first end at which set-points must be held, and are not: with heat only where the request states it.
+
+    Parameters
+    ----------
+    law : FeedbackLinearization
+        Its system and current limits.
+    request : DesignRequest
+        Set-points, ranges of ambients and heats.
+    """
+    heats = ({}, *(heat_ends(law.system, request) if request.heat else ()))
+    found = (_corner(law, request, at, heat) for heat in heats for at in ambient_ends(request))
+    return next((one for one in found if not one.held), None)
+
+
+def heat_ends(system: System, request: DesignRequest) -> list[dict[str, float]]:
+    """The least and the most heat into all lumps at once [W], as far as there is any.
+
+    Parameters
+    ----------
+    system : System
+        With its heaters and their limits.
+    request : DesignRequest
+        With the heats that are stated.
+    """
+    ranges = heater_heat(system, stated=request.heat)
+    ends = [{lump: pair[end] for lump, pair in ranges.items() if pair[end]} for end in (0, 1)]
+    return [one for one in ends if one]
+
+
+def _corner(law: FeedbackLinearization, request: DesignRequest, ambient: dict[str, float], heat: dict[str, float]
+            ) -> Corner:
+    try:
+        return Corner(ambient, heat, reachable(law, request.setpoint, inputs=ambient, load=heat or None,
+                                               regulate=request.regulate))
+    except InputError as refusal:
+        if not heat:  # what is wrong without heat is wrong with the request
+            raise
+        return Corner(ambient, heat, None, refusal.what)
