@@ -216,9 +216,11 @@ def _compared(healthy: Reference, new: Refit) -> Compared:
     moved = new.v[:new.structure.n_parameters] - healthy.scatter.center
     for candidate, values in zip(new.structure.effects, new.structure.quantities(new.v), strict=True):
         if candidate.effect.name == NAME:
-            moved[place_of(candidate.where, ranges)] += values[SIZE]
+            place = place_of(candidate.where, ranges)
+            number = new.v[place]  # itself where its coordinate is linear, and a change a factor on it
+            moved[place] += values[SIZE] if ranges.logarithmic[place] else number * np.expm1(values[SIZE])
     moved = moved[:len(ranges.names)]
-    deviation = np.where(ranges.logarithmic, np.expm1(moved), moved / ranges.unit)
+    deviation = np.where(ranges.logarithmic, np.expm1(moved), moved / healthy.whole)
     return Compared(len(healthy.each), fit.rms, float(np.sqrt(square_beyond_noise(fit))), healthy.relative,
                     dict(zip(ranges.names, map(float, deviation), strict=True)))
 

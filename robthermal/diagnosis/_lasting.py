@@ -8,7 +8,18 @@ from dataclasses import replace
 
 from ..errors import Diverged, InputError
 from ._judge import Validation, of_its_time
-from .evidence import NEEDED, PREDICTED, SURE, Evidence, Stability, expected_rms, left, reproducible, stability
+from .evidence import (
+    NEEDED,
+    PREDICTED,
+    SURE,
+    Evidence,
+    Stability,
+    deviations,
+    expected_rms,
+    left,
+    reproducible,
+    stability,
+)
 from .fit import Refit, coarsened, exact
 from .search import Accepted, Entry, SearchState, without
 
@@ -67,19 +78,28 @@ def _holds(rounds: Sequence[Accepted], fit: Refit, nominal: Refit, place: int, v
     """Whether an effect keeps its size over segments and is better than none in block after block, or predicts.
 
     Training records that hardly excite an effect say little of its size part by part. Where that size takes nearly all
-    of what is left without it off records that no fit has seen, they have confirmed it.
+    of what is left without it off records that no fit has seen, they have confirmed it; not a size that may be zero.
     """
     if _stability(fit, place).constant and _reproducible(rounds, fit, nominal, place) >= SURE:
         return True
     return _predicted(fit, nominal, place, validation) >= PREDICTED
 
 
+def _is_beyond_zero(fit: Refit, place: int) -> bool:
+    """Whether the size of an effect is beyond its standard deviation, which includes the remainder."""
+    at, size = fit.structure.column_of(place), fit.structure.effects[place].effect.size
+    std = float(deviations(fit, exact(fit), [at])[0])
+    return std < (1.0 if size.lower > 0 else abs(fit.v[at]))
+
+
 def _predicted(fit: Refit, nominal: Refit, place: int, validation: Validation | None) -> float:
     """Part of the excess mean square of validation records left without an effect that it removes.
 
-    0 for a swing or a step at a time of the training records: on another day it fits by accident.
+    0 for a swing or a step at a time of the training records: on another day it fits by accident. And for a size that
+    may be zero: what helps is then a number of the network that is elsewhere beside it.
     """
-    if validation is None or validation.data is None or of_its_time(fit.structure.effects[place]):
+    if validation is None or validation.data is None or of_its_time(fit.structure.effects[place]) or (
+            not _is_beyond_zero(fit, place)):
         return 0.0  # before the effects are fitted without it: that costs
     whole = exact(fit)
     plain = _plain(whole, exact(nominal), place)

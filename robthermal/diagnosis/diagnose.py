@@ -44,6 +44,7 @@ from ._lasting import evidence_of
 from ._late_commands import late_by_rows
 from ._misread_inputs import MisreadRows
 from ._nearest import nearest
+from ._one_curve import share_one_curve
 from ._other_log import asked_of_log
 from ._own_names import in_own_names
 from ._refine import refine as refined
@@ -323,9 +324,8 @@ def _caveats(judged: Judged, found: Diagnosis) -> tuple[str, ...]:
     if verdict == "named_with_remainder":
         said += place_undecided([one.key for one in found.effects], found.alternatives)
     if verdict in ("named", "named_with_remainder", "ambiguous"):
-        said += periods_undecided(state.rounds, verdict != "named")
-        said += late_by_rows(state.fit)
-        said += [*surfaces(found.effects), *steep_powers(found.effects)]
+        said += [*periods_undecided(state.rounds, verdict != "named"), *late_by_rows(state.fit)]
+        said += [*share_one_curve(state.fit), *surfaces(found.effects), *steep_powers(found.effects)]
     if verdict in ("named_with_remainder", "ambiguous"):
         said += falling_powers(found.effects, nominal.span)
     said += at_bounds(state.fit, verdict)

@@ -62,6 +62,17 @@ def test_the_reference_is_in_the_file(fan: rt.diagnosis.Diagnosis) -> None:
     assert block["deviation"][FAN] == pytest.approx(-0.5, abs=0.1) and block["remainder"] <= block["rms"]
 
 
+def test_a_range_that_begins_at_zero_changes_no_deviation(old: list[rt.Record], fan: rt.diagnosis.Diagnosis) -> None:
+    """Its coordinate is no logarithm: a fan at half its conductance was said to deviate by thousands of per cent."""
+    loose = rt.thermal.parse_system(SYSTEM.replace('sink-room.conductance" = { lower = 0.05, upper = 8.0',
+                                                   'sink-room.conductance" = { lower = 0.0, upper = 8.0'))
+    found = rt.diagnose(loose, record(21, Day({"fan": 0.5}), **SIZES), reference=old, effects=FEW)
+    assert found.reference is not None and fan.reference is not None
+    assert [one.where for one in found.effects] == [(FAN,)]
+    assert found.reference.deviation[FAN] == pytest.approx(fan.reference.deviation[FAN], abs=0.05)
+    assert found.reference.scatter[FAN] < 0.1
+
+
 def test_a_healthy_day_is_consistent(rig: rt.System, old: list[rt.Record]) -> None:
     found = rt.diagnose(rig, record(22, **SIZES), reference=old)  # with the whole catalog
     assert found.verdict == "consistent" and found.effects == () and found.outcome.ok

@@ -12,6 +12,9 @@ import numpy as np
 import pytest
 
 import robthermal as rt
+from robthermal.diagnosis._one_curve import share_one_curve
+from robthermal.diagnosis.fit import extended
+from robthermal.jobs.diagnose._effect_words import at_place
 
 H, FINER, RESISTANCE, COPPER, GAP = 4.0, 8, 0.04, 0.0039, 3e-4  # s, steps in each, Ω, 1/K, 1/rpm
 EFFECTS = ["driven_conductance", "heater_power_slope", "sensor_offset", "heat_source", "input_feedthrough",
@@ -131,3 +134,21 @@ def test_a_column_heats_one_lump_at_a_time() -> None:
     structure = rt.diagnosis.refit(MOTOR, day(1, 300, 0.0)).structure
     assert structure.with_effect(magnet).hides(tooth) and not structure.with_effect(magnet).hides(share)
     assert not structure.hides(tooth)
+
+
+def test_what_follows_a_column_by_one_curve_is_said_and_no_column_saturates() -> None:
+    """The path across the gap and the heat of the magnet have one curve of the speed, friction has another."""
+    with_heat = MOTOR.with_parameters({"inputs.speed.gain": 0.01})
+    both = rt.thermal.add_effect(with_heat, "driven_conductance", ["magnet-tooth", "speed"], {"relative": 3e-4}).system
+    curve = next(one for one in rt.diagnosis.candidates(MOTOR, ["input_gain_slope"]) if one.where == ("speed",))
+    for system, n in ((both, 1), (with_heat, 0)):
+        fit = rt.diagnosis.refit(system, day(11, 400, 0.0), rt.diagnosis.noise_floor(MOTOR, day(11, 400, 0.0)),
+                                 parameters=["lumps.magnet.capacity"])
+        curved = fit.structure.with_effect(curve)
+        v = curved.carried(fit.structure, fit.v, [{"slope": 1e-6}])
+        said = share_one_curve(fit) + share_one_curve(extended(fit, curved, v, 1))
+        assert len(said) == n and all("The conductance of magnet-tooth and the heat into magnet follow speed by one "
+                                      "curve here, input_gain_slope(speed)" in one for one in said)
+    words = at_place(MOTOR, "input_saturation", ("speed",))
+    assert words == "a growth of what follows speed that is less than in proportion to it"
+    assert at_place(MOTOR, "input_saturation", ("iron",)) == "the saturation of input iron"

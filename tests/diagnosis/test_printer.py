@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import robthermal as rt
@@ -55,6 +56,19 @@ def test_an_effect_that_training_hardly_shows_is_confirmed_by_what_it_predicts(
     hot = Validation(of_bed(measured(13, *program(13, 900, [60.0, 80.0, 100.0]))))
     confirmed, = evidence_of(state.rounds, state.fit, nominal, hot)
     assert confirmed.lasting and confirmed.predicted > 0.99 and confirmed.stability == alone.stability
+
+
+def test_a_size_that_may_be_zero_is_not_confirmed(
+        hardly_excited: tuple[SearchState, Refit], monkeypatch: pytest.MonkeyPatch) -> None:
+    """A share of 0.013 ± 0.118 was a name: beside it other numbers had moved, and these predicted."""
+    state, nominal = hardly_excited
+    hot = Validation(of_bed(measured(13, *program(13, 900, [60.0, 80.0, 100.0]))))
+    at = state.fit.structure.column_of(0)
+    for times, lasts in ((1.1, False), (0.9, True)):
+        monkeypatch.setattr("robthermal.diagnosis._lasting.deviations",
+                            lambda fit, plain, columns, of=times: np.array([of * abs(fit.v[at])]))
+        found, = evidence_of(state.rounds, state.fit, nominal, hot)
+        assert found.lasting is lasts and (found.predicted > 0.9) is lasts
 
 
 def test_a_size_that_is_three_times_too_large_is_not_confirmed(hardly_excited: tuple[SearchState, Refit]) -> None:

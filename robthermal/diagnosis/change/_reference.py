@@ -72,10 +72,18 @@ class Reference:
     listed: Ranges
 
     @property
+    def whole(self) -> Array:
+        """What a step of every listed parameter is relative to: it; the spread of its range, if that has signs."""
+        ranges = self.listed
+        center = np.abs(self.scatter.center[:len(ranges.names)])
+        signed = (ranges.lower < 0.0) | (center == 0.0)
+        return np.where(ranges.logarithmic, 1.0, np.where(signed, ranges.unit, center))
+
+    @property
     def relative(self) -> dict[str, float]:
         """Scatter of every listed parameter from record to record, relative to it; to its range, if that has signs."""
         std = self.scatter.std[:len(self.listed.names)]
-        return dict(zip(self.listed.names, map(float, std / self.listed.unit), strict=True))
+        return dict(zip(self.listed.names, map(float, std / self.whole), strict=True))
 
 
 def reference_of(system: System, records: Measured | Sequence[Measured], new: Sequence[Measured], *,

@@ -383,8 +383,14 @@ def square_beyond_noise(fit: Refit) -> float:
 
 
 def expected_squares(fit: Refit, path: LinearizedRecord) -> Array:
-    """Mean squares of the free-run residual of a record that its noise alone would give, (n_sensors,) [K²]."""
+    """Mean squares of the free-run residual of a record that its noise alone would give, (n_sensors,) [K²].
+
+    A level that the fit has raised beyond what is declared, and beyond what the readings show from one to the next,
+    holds what is not explained: that is no noise.
+    """
     noise, disturbance = fit.levels.of(path, fit.floor)
+    shown = [max(fit.floor.noise[name], fit.floor.rough.get(name, 0.0)) for name in path.one.sensors]
+    noise = np.minimum(noise, shown)
     slow = fit.levels.slow(path, fit.floor)
     squares = noise**2 if slow is None else noise**2 + slow.std**2
     return np.asarray(heat_spread(path, disturbance, fit.levels.wandering(path)) + squares, np.float64)

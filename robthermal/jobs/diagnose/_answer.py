@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from ...diagnosis import Diagnosis, Found, Gap
+from ...thermal import System
 from ._change_words import change_in_words, gain_in_words, nothing_changed
-from ._effect_words import in_words, labels_in_words
+from ._effect_words import at_place, labels_in_words
 
 _SHRUNK = 0.9  # of the error: where more is left, free runs beside a room that was not recorded show no gain
 
@@ -85,7 +86,8 @@ def accepted_in_words(found: Diagnosis) -> str:
     found : Diagnosis
         What was found.
     """
-    sets = [[_accepted(effect, bool(found.reference)), *(in_words(name, where) for name, where in others)]
+    system = found.nominal.system
+    sets = [[_accepted(system, effect, bool(found.reference)), *(at_place(system, *other) for other in others)]
             for effect, others in zip(found.effects, found.alternatives, strict=True)]
     between = "; and " if any(len(names) > 2 for names in sets) and len(sets) > 1 else ", and "
     return between.join(map(_one_of, sets))
@@ -102,9 +104,9 @@ def _shown(found: Diagnosis) -> tuple[Gap, str]:
     return found.gap["train"], "the new records" if found.reference else "the training data"
 
 
-def _accepted(effect: Found, changed: bool) -> str:
+def _accepted(system: System, effect: Found, changed: bool) -> str:
     if changed and effect.effect == "parameter_change":
         return change_in_words(effect)
     if changed and effect.effect == "input_gain":
         return gain_in_words(effect)
-    return in_words(effect.effect, effect.where)
+    return at_place(system, effect.effect, effect.where)

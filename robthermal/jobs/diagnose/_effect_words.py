@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from ...thermal import parameter_in_words
+from ...thermal import System, parameter_in_words
 
 WORDS = {  # {0}, {1}: the parts it acts on, in the order of the catalog
     "ambient_drift": "a swing or drift of {0}, which was not recorded",
@@ -44,6 +44,13 @@ WORDS = {  # {0}, {1}: the parts it acts on, in the order of the catalog
     "thomson": "the Thomson heat of {0}",
 }
 
+_FOLLOWED = {  # of a column that heats nothing: the imperfection is of what follows it
+    "input_delay": "a delay of what follows {0}",
+    "input_gain_slope": "a growth of what follows {0} that is not in proportion to it",
+    "input_lag": "a lag of what follows {0}",
+    "input_saturation": "a growth of what follows {0} that is less than in proportion to it",
+}
+
 
 def in_words(name: str, where: tuple[str, ...]) -> str:
     """An effect at its place.
@@ -60,6 +67,24 @@ def in_words(name: str, where: tuple[str, ...]) -> str:
     if name in WORDS:
         return WORDS[name].format(*where)
     return f"{name.replace('_', ' ')} at {', '.join(where)}"
+
+
+def at_place(system: System, name: str, where: tuple[str, ...]) -> str:
+    """An effect at its place in a system, in which some columns heat nothing.
+
+    Parameters
+    ----------
+    system : System
+        Without the effect.
+    name : str
+        Of the catalog, or your own.
+    where : tuple of str
+        Parts of the system it acts on.
+    """
+    column = system.inputs.get(where[0]) if where else None
+    if name in _FOLLOWED and column is not None and not column.gain:
+        return _FOLLOWED[name].format(*where)
+    return in_words(name, where)
 
 
 def labels_in_words(text: str) -> str:

@@ -12,7 +12,8 @@ from ._signatures import by_heat
 
 
 def _places(system: System) -> list[Where]:
-    return [(name, lump) for (name, part), lump in product(system.inputs.items(), system.lumps) if not part.gain]
+    return [(name, lump) for (name, part), lump in product(system.inputs.items(), system.lumps)
+            if not part.gain and (part.feedthrough is None or part.feedthrough.lump != lump)]
 
 
 def _add(system: System, where: Where, values: Values) -> System:
