@@ -155,6 +155,13 @@ class System(Part):
         return sensor
 
     @property
+    def cascade(self) -> str:
+        """Which module cools the hot face of which other, in words; empty where the modules stand side by side."""
+        above = {module.hot: name for name, module in self.modules.items()}
+        return next((f"module {name!r} cools the hot face {module.cold!r} of module {above[module.cold]!r}"
+                     for name, module in self.modules.items() if module.cold in above), "")
+
+    @property
     def sensor_units(self) -> dict[str, str]:
         """Unit of every sensor's reading inside a record: "K", or "V" for the voltage of a module."""
         return {name: sensor.unit for name, sensor in self.sensors.items()}
