@@ -154,6 +154,32 @@ class System(Part):
                              remedy="Leave it out here: voltages serve simulation, calibration and diagnosis.")
         return sensor
 
+    def prompt_thermometer(self, name: str, where: str) -> Sensor:
+        """Sensor by name, refusing one that does not read the temperature of its lump at once, as observers need it.
+
+        Parameters
+        ----------
+        name : str
+            Name of the sensor.
+        where : str
+            Argument that named it, for messages.
+
+        Returns
+        -------
+        Sensor
+
+        Raises
+        ------
+        InputError
+            There is no such sensor, it reads the voltage of a module, or it lags.
+        """
+        sensor = self.thermometer(name, where)
+        if sensor.lag:
+            raise InputError(f"sensor {name!r} lags ({sensor.lag})", where=where,
+                             expected="sensors that read their lump at once, without time constant and delay",
+                             remedy="Describe its mass as a lump, linked to the lump it measures, or leave it out.")
+        return sensor
+
     @property
     def cascade(self) -> str:
         """Which module cools the hot face of which other, in words; empty where the modules stand side by side."""

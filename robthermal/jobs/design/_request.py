@@ -113,8 +113,8 @@ class DesignRequest:
         ------
         InputError
             No modules; a cascade; a module without set-point, or one that does not exist; a set-point outside of the
-            box; current limits beyond the file's or without zero; too many lumps for a certified observer; points,
-            margins or parameters that there are not; another format.
+            box; current limits beyond the file's or without zero; too many lumps for a certified observer; sensors
+            that lag; points, margins or parameters that there are not; another format.
         """
         if not system.modules:
             raise InputError(f"{system.name!r} has no thermoelectric module", where="design",
@@ -155,6 +155,8 @@ class DesignRequest:
             raise InputError(f"there is no format {unknown[0]!r}", where="--export", expected=" or ".join(FORMATS))
         for name in self.parameters or {}:
             system.parameter(name)  # refuses unknown names
+        for name in self.sensors:
+            system.prompt_thermometer(name, "--sensors")
         if self.sensors and len(system.lumps) > _MOST_LUMPS:
             raise InputError(f"{len(system.lumps)} lumps are too many for a certified observer", where=system.name,
                              expected=f"at most {_MOST_LUMPS}", remedy="Reduce the system with rt.thermal.reduce, or "
