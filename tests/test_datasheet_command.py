@@ -114,3 +114,15 @@ def test_names_that_need_quotes_are_quoted(tmp_path: Path) -> None:
     rt.jobs.write_modules(rt.jobs.compare_modules(sheets), tmp_path / "m.toml")
     table = tomllib.loads((tmp_path / "m.toml").read_text(encoding="utf-8"))["modules"]["TM 127-1.4-4.0"]
     assert table["reference_temperature"] == -8.0 and table["seebeck"]["value"] == pytest.approx(15.5 / 300.15)
+
+
+@pytest.mark.parametrize(("current", "notes"), [
+    ("2", []), ("18.72", ["18.72 A are 4.8 times the Imax of the sheet, 3.9 A", "The load is negative: the cold face"]),
+    ("-2", ["The load is negative"])])
+def test_a_current_beyond_the_sheet_and_a_negative_load_are_said(run: Run, current: str, notes: list[str]) -> None:
+    point = ("datasheet", "--rating", ONE, "--cold", "10", "--hot", "40", "--current", current)
+    said, found = run(*point), json.loads(run(*point, "--json").out)["modules"][0]
+    assert said.status == 0 and len(found["notes"]) == len(notes)
+    assert all(one.startswith(note) for one, note in zip(found["notes"], notes, strict=True))
+    assert all(one in said.out for one in found["notes"]) and ("Imax of the sheet" in said.out) == (current == "18.72")
+    assert not notes or f"gives off {-found['point']['load']:.4g} W, nothing is cooled" in found["notes"][-1]

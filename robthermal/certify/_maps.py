@@ -97,7 +97,7 @@ def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[fl
     setpoint : sequence of float
         Temperatures of all cold faces [K].
     load : sequence of float
-        Heat into every cold face [W].
+        Heat into every cold face [W], the only heat beside what modules and ambients give: the heaters are off.
     temperature : tuple or mapping
         The stated box, which the machine must not leave [K].
     method : {"energy", "sum", "max", "lyapunov"}
@@ -120,7 +120,7 @@ def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[fl
     Raises
     ------
     InputError
-        No modules, empty or non-finite axes, Celsius, a stated box that excludes an ambient.
+        No modules, a cascade, empty or non-finite axes, Celsius, a stated box that excludes an ambient.
 
     Examples
     --------
@@ -134,6 +134,10 @@ def limit_map(system: System, *, ambient: Sequence[float], setpoint: Sequence[fl
                                                         strict=True)]
     if not isinstance(jobs, int) or isinstance(jobs, bool) or jobs < 1:
         raise InputError(f"jobs = {jobs!r}", where="argument jobs", expected="a whole number, at least 1")
+    if system.cascade:
+        raise InputError(f"a cascade: {system.cascade}", where="argument system",
+                         expected="modules side by side: a map has one set-point and one load for all cold faces",
+                         remedy="Use rt.certify.usable_current with a set-point for every stage.")
     system_section(system)  # refuses heats of its own: the loads of the map would stand in their place
     ranges = parameter_box(system, parameters or {})
     nominal = question_of(system, temperature=temperature, parameters=parameters, lower=lower, method=method, heat={},

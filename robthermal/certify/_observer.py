@@ -129,11 +129,7 @@ def sensor_list(system: System, names: Sequence[str]) -> list[dict[str, Any]]:
     found = []
     for name in names:
         if name in system.sensors:
-            sensor = system.thermometer(name, "argument sensors")
-            if sensor.time_constant or sensor.delay:
-                raise InputError(f"sensor {name!r} lags (time constant {sensor.time_constant} s, delay {sensor.delay} "
-                                 "s)", where="argument sensors", expected="sensors that read their lump at once",
-                                 remedy="Model the lag as a lump of its own, or leave the sensor out.")
+            sensor = system.prompt_thermometer(name, "argument sensors")
             found.append({"name": name, "lump": sensor.lump, "gain": sensor.gain})
         elif name in system.lumps:
             found.append({"name": name, "lump": name, "gain": 1.0})

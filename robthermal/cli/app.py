@@ -261,7 +261,8 @@ def design(system: SystemFile, out: Out = Path("robthermal-design"),
                metavar="NAME=VALUE")] = None,
            sample_time: Annotated[float, typer.Option(help="Of controller and observer [s].")] = 1.0,
            sensors: Annotated[str | None, typer.Option(
-               help="What the observer reads; default every sensor that does not lag.", metavar="NAME,NAME")] = None,
+               help="What the observer reads; default every sensor that does not lag. \"\" for no observer.",
+               metavar="NAME,NAME")] = None,
            method: Annotated[str, typer.Option(
                help="Of the certificates: energy, sum, max or lyapunov. Or hinf, h2, mixed, mu, output-feedback, "
                "frf-pid, polytope, lpv, tem, anti-windup, mpc: a synthesis for PLANT.toml (docs/command_line.md); of "

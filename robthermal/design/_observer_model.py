@@ -62,7 +62,8 @@ class ObserverModel:
             sensor = system.sensors[name]
             if sensor.time_constant + sensor.delay > h:
                 raise InputError(f"sensor {name!r} lags {sensor.time_constant + sensor.delay:g} s, more than a sample",
-                                 where="argument sensors", expected=f"sensors faster than {h:g} s",
+                                 where="argument sensors", expected=f"sensors that lag at most {h:g} s; for a "
+                                 "certificate sensors that read their lump at once",
                                  remedy="Describe its mass as a lump, linked to the lump it measures.")
         eq = Equations(system)
         n, E = len(system.lumps), eq.capacity

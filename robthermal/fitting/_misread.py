@@ -1,4 +1,4 @@
-"""Records with an input of the wrong sign, or with two columns exchanged: said by name.
+"""Records with an input of the wrong sign, with two columns exchanged, or with times in another unit: said by name.
 
 Whatever is fitted to such a record is wrong, and effects that are not there may come nearest. The model of the system
 file, unfitted, leaves less of the record read otherwise, and fitted far less. Of a record that is read right it leaves
@@ -25,10 +25,13 @@ from ._start import initial_of
 
 _LESS = 0.3  # of the mean square that the answer leaves: what only a wrong sign or a wrong column explains
 _FAR_LESS = 0.05  # of the mean square that the fit without effects leaves, where these do not reach it either
-_FITTED = 3  # of the readings that are better than the record as it is
+_FITTED = 3  # of the readings that are better than the record as it is; of those of its times the best one
 _NOISE = 9.0  # times the mean square of the noise: records that leave less are not asked
 _MOST = 60  # ways to read a record that are tried
 _PART = 2000  # samples of every record that they are tried on
+_TIMES = {1e-3: ("1000 times too long", "ms"), 1.0 / 60.0: ("60 times too long", "s"),
+          60.0: ("60 times too short", "min"), 1e3: ("1000 times too short", "s"),
+          3600.0: ("3600 times too short", "h")}  # by factor: what is wrong, and the unit to declare
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,7 @@ class _Reading:
 
 def misread(system: System, data: Sequence[Data], before: float, left: float, noise: Mapping[str, float],
             fitted: Callable[[list[Record]], float]) -> str:
-    """What the records seem to have wrong, and what to do: a sign turned, two columns exchanged; empty if neither.
+    """What the records seem to have wrong, and what to do: a sign, two columns, the unit of times; empty if nothing.
 
     Parameters
     ----------
@@ -60,20 +63,25 @@ def misread(system: System, data: Sequence[Data], before: float, left: float, no
     warm = [name for name in system.thermometers if any(name in one.sensors for one in data)]
     if not warm or left**2 <= _NOISE * float(np.mean([noise.get(name, 0.0) ** 2 for name in warm])):
         return ""
-    readings = list(_readings(system, data, warm))[:_MOST]
     as_it_is = _mean_square(system, data, lambda record: record)
-    squares = [_mean_square(system, data, one.read) for one in readings]
-    better = sorted((square, i) for i, square in enumerate(squares) if square < as_it_is)[:_FITTED]
-    rms = {i: _or_infinite(fitted, [readings[i].read(one.record) for one in data]) for _, i in better}
-    least = min(rms.values(), default=np.inf)
+    better = [reading for readings, most in ((_readings(system, data, warm), _FITTED), (_other_times(), 1))
+              for reading in _better(system, data, list(readings)[:_MOST], as_it_is)[:most]]
+    rms = [_or_infinite(fitted, [reading.read(one.record) for one in data]) for reading in better]
+    least = min(rms, default=np.inf)
     if least >= left or least**2 >= max(_LESS * left**2, _FAR_LESS * before**2):
         return ""
-    found = [readings[i] for i in rms if rms[i] ** 2 <= 2.0 * least**2]
+    found = [reading for reading, each in zip(better, rms, strict=True) if each**2 <= 2.0 * least**2]
     wrong = " or ".join(one.wrong for one in found)
     answer = f" ({left:.2g} K with effects)" if left < before else ""
     return (f"{wrong[0].upper()}{wrong[1:]}: so read, the fit leaves {least:.2g} K of the records instead of "
             f"{before:.2g} K{answer}. Look at the wiring and at the program; if it is so: "
             f"{' Or '.join(dict.fromkeys(one.remedy for one in found))}")
+
+
+def _better(system: System, data: Sequence[Data], readings: Sequence[_Reading], as_it_is: float) -> list[_Reading]:
+    """Readings of which the unfitted model leaves less than of the records as they are, the best first."""
+    squares = [_mean_square(system, data, one.read) for one in readings]
+    return [readings[i] for square, i in sorted(zip(squares, range(len(squares)), strict=True)) if square < as_it_is]
 
 
 def _or_infinite(fitted: Callable[[list[Record]], float], records: list[Record]) -> float:
@@ -101,6 +109,17 @@ def _readings(system: System, data: Sequence[Data], warm: Sequence[str]) -> Iter
         for one, other in combinations(known, 2):
             yield _Reading(f"the columns of the {kind} {one!r} and {other!r} seem to be exchanged",
                            f"exchange {one} and {other} in [columns].", _exchanged(one, other))
+
+
+def _other_times() -> Iterator[_Reading]:
+    """Times that were in another unit than they were read in."""
+    for factor, (wrong, unit) in _TIMES.items():
+        yield _Reading(f"the time column seems to be in another unit, its times {wrong}",
+                       f'declare its unit, time_format = "{unit}" in [record].', _with_times(factor))
+
+
+def _with_times(factor: float) -> Callable[[Record], Record]:
+    return lambda record: record.changed(sample_time=record.sample_time * factor, start_time=record.start_time * factor)
 
 
 def _turned(name: str, outputs: Sequence[str]) -> Callable[[Record], Record]:

@@ -1,4 +1,4 @@
-"""Traps of units: Celsius declared kelvin, kelvin declared Celsius, milliampere, values outside the declared limits."""
+"""Traps of units: Celsius declared kelvin, kelvin declared Celsius, milliampere, milliwatt, values outside limits."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ RowLabel = Callable[[int], str]
 
 _COLD = 60.0  # °C: what a furnace begins at; in kelvin only liquid helium makes it
 _STEP = 100.0  # K from a row to the next: a change of the unit is 273
-_MILLI = 100.0  # a current this many times beyond its limits is in mA
+_MILLI = 100.0  # a current this many times beyond its limits is in mA, a heat in mW
+_WORDS = {"A": "ampere", "W": "watt", "V": "volt"}
 
 
 def check_temperature(name: str, column: Array, stamps: Array, unit: str, row: RowLabel, where: str,
@@ -53,31 +54,50 @@ def _heats_up(column: Array) -> bool:
     return all(bool((steps[np.diff(read > bound)] <= _STEP).any()) for bound in (_COLD, LOWEST_KELVIN, HIGHEST_CELSIUS))
 
 
-def limit_notes(columns: Mapping[str, Array], current_limits: Any, input_limits: Any, where: str) -> list[str]:
-    """What is outside its declared limits, in words; a current in milliampere is refused."""
+def limit_notes(columns: Mapping[str, Array], units: Mapping[str, str], current_limits: Any, input_limits: Any,
+                where: str) -> list[str]:
+    """What is outside its declared limits, in words; a current in milliampere and a heat in milliwatt are refused."""
     notes = []
     for name, limits in (current_limits or {}).items():
         if limits is not None and name in columns:
-            _refuse_milliampere(name, columns[name], limits, where)
+            if _largest(columns[name]) > _MILLI * _bound(limits):
+                raise _milli(f"the current {name!r}", columns[name], limits, "A", "current_limits", where)
             notes += _outside(name, columns[name], limits, " A", "; if it is in mA, divide by 1000")
     for name, limits in (input_limits or {}).items():
         if limits is not None and name in columns:
+            if _largest(columns[name]) > _MILLI * _bound(limits) and _mostly_outside(columns[name], limits):
+                raise _milli(f"the heater {name!r}", columns[name], limits, units.get(name, ""),
+                             f"limits in [inputs.{name}]", where)
             notes += _outside(name, columns[name], limits, "", "")
     return notes
 
 
-def _refuse_milliampere(name: str, column: Array, limits: tuple[float, float], where: str) -> None:
-    largest = max(abs(float(np.nanmin(column))), abs(float(np.nanmax(column))))
-    bound = max(abs(limits[0]), abs(limits[1]))
-    if bound > 0.0 and largest > _MILLI * bound:
-        raise InputError(
-            f"the current {name!r} reaches {largest:.6g} A, {largest / bound:.0f} times its declared limit of "
-            f"{bound:g} A: this looks like mA",
-            where=where,
-            expected="ampere",
-            remedy='Divide the column by 1000: [columns] with unit = "mA", or with a scale, whose scale · cell is in A '
-            "whatever the unit; or correct current_limits.",
-        )
+def _largest(column: Array) -> float:
+    return float(np.nanmax(np.abs(column)))
+
+
+def _bound(limits: tuple[float, float]) -> float:
+    return max(abs(limits[0]), abs(limits[1])) or np.inf
+
+
+def _mostly_outside(column: Array, limits: tuple[float, float]) -> bool:
+    """Whether half of a heater's rows with power are beyond its limits; single misread cells are left out elsewhere."""
+    power = np.abs(column[np.isfinite(column) & (column != 0.0)])
+    return bool(np.median(power) > _bound(limits))
+
+
+def _milli(what: str, column: Array, limits: tuple[float, float], unit: str, key: str, where: str) -> InputError:
+    """Refusal of a column in thousandths of its unit; the unit is empty where nobody says it."""
+    largest, bound, known = _largest(column), _bound(limits), unit in _WORDS
+    return InputError(
+        f"{what} reaches {largest:.6g} {unit}".rstrip() + f", {largest / bound:.0f} times its declared limit of "
+        + f"{bound:g} {unit}".rstrip() + f": this looks like {f'm{unit}' if known else 'another unit'}",
+        where=where,
+        expected=_WORDS.get(unit, "the unit of its limits"),
+        remedy=(f'Divide the column by 1000: [columns] with unit = "m{unit}", or with a scale, whose scale · cell is '
+                f"in {unit} whatever the unit; or correct {key}." if known else
+                f"Give the column a scale in [columns]; or correct {key}."),
+    )
 
 
 def _outside(name: str, column: Array, limits: tuple[float, float], unit: str, hint: str) -> list[str]:

@@ -256,8 +256,8 @@ class Integrator:
         worst = int(np.argmax(np.abs(lumps - 300.0)))
         name = self.eq.system.lump_names[worst]
         raise Diverged(f"the simulation runs away at {time:.6g} s: lump {name!r} is at {lumps[worst]:.4g} K. "
-                       "Thermal runaway of a module, or a current far beyond its limits: check signs and units, or "
-                       "limit the current to what rt.certify.usable_current gives.", time=time)
+                       "Thermal runaway of a module, or a current or heat far beyond its limits: check signs and "
+                       "units, or limit the current to what rt.certify.usable_current gives.", time=time)
 
 
 def _whole(plan: Schedule, k: int) -> int:

@@ -307,6 +307,13 @@ class Sensor(Part):
     initial: Kelvin | None = None
 
     @property
+    def lag(self) -> str:
+        """How late a thermometer reads, in words; empty where it reads its lump at once."""
+        parts = (f"time constant {self.time_constant:g} s" * bool(self.time_constant),
+                 f"delay {self.delay:g} s" * bool(self.delay))
+        return ", ".join(filter(None, parts))
+
+    @property
     def unit(self) -> str:
         """Unit of the reading: "K" or "V"."""
         return "V" if self.quantity == "voltage" else "K"

@@ -154,6 +154,39 @@ class System(Part):
                              remedy="Leave it out here: voltages serve simulation, calibration and diagnosis.")
         return sensor
 
+    def prompt_thermometer(self, name: str, where: str) -> Sensor:
+        """Sensor by name, refusing one that does not read the temperature of its lump at once, as observers need it.
+
+        Parameters
+        ----------
+        name : str
+            Name of the sensor.
+        where : str
+            Argument that named it, for messages.
+
+        Returns
+        -------
+        Sensor
+
+        Raises
+        ------
+        InputError
+            There is no such sensor, it reads the voltage of a module, or it lags.
+        """
+        sensor = self.thermometer(name, where)
+        if sensor.lag:
+            raise InputError(f"sensor {name!r} lags ({sensor.lag})", where=where,
+                             expected="sensors that read their lump at once, without time constant and delay",
+                             remedy="Describe its mass as a lump, linked to the lump it measures, or leave it out.")
+        return sensor
+
+    @property
+    def cascade(self) -> str:
+        """Which module cools the hot face of which other, in words; empty where the modules stand side by side."""
+        above = {module.hot: name for name, module in self.modules.items()}
+        return next((f"module {name!r} cools the hot face {module.cold!r} of module {above[module.cold]!r}"
+                     for name, module in self.modules.items() if module.cold in above), "")
+
     @property
     def sensor_units(self) -> dict[str, str]:
         """Unit of every sensor's reading inside a record: "K", or "V" for the voltage of a module."""

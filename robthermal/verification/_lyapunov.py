@@ -54,7 +54,9 @@ def prove(problem: Contraction, rate: fmpq) -> Proof:
         return Proof(False, f"method lyapunov: {broken}")
     n = len(problem.matrix)
     base, nonlinear, missing = link_slopes(problem.system, problem.region)
-    missing = missing or too_much(problem.system, problem.region, nonlinear, PIECES[0], n)
+    if missing:
+        return Proof(False, f"method lyapunov: {missing}; use energy, sum or max")
+    missing = too_much(problem.system, problem.region, nonlinear, PIECES[0], n)
     if missing:
         return Proof(False, f"method lyapunov: {missing}")
     form = _Form(problem)
@@ -163,7 +165,7 @@ def link_slopes(system: ThermalSystem, region: Region, ambient: Mapping[str, Int
             nonlinear.append(_ends(slope, exchange, "convection"))
         elif ends and link.convects:
             return base, nonlinear, (f"natural convection from lump {name_of(names[ends[0]])} to an ambient has no "
-                                     "bounded slope; use energy, sum or max")
+                                     "bounded slope, because this claim states no range of the ambient")
         else:
             exchange = {(i, i): fmpq(-1) for i in ends}
             if ends and link.spread != 0:

@@ -215,8 +215,10 @@ def _inequality(problem: Observer) -> _Inequality | str:
     """Return the parts of the inequality, P > 0 proven, or why there is none."""
     n = len(problem.matrix)
     base, nonlinear, missing = link_slopes(problem.system, problem.region)
-    broken = (asymmetry(problem.matrix) or missing
-              or too_much(problem.system, problem.region, nonlinear, PIECES[0], 2 * n))
+    if missing:
+        return (f"{missing}; no other method helps: leave the observer out, or describe the link by a conductance "
+                "alone, with a range of it among the parameters")
+    broken = asymmetry(problem.matrix) or too_much(problem.system, problem.region, nonlinear, PIECES[0], 2 * n)
     if broken:
         return broken
     P = arb_mat(n, n, [arb(entry) for row in problem.matrix for entry in row])

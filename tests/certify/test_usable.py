@@ -1,6 +1,7 @@
 """The usable current against an own simulation: the machine never leaves its box with it, and does with more."""
 
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -40,6 +41,23 @@ def test_demo_machine_stays_in_the_box_with_its_usable_current(two):
         _, states = network.run(np.full(18, room), 20_000.0, np.full(2, found.current), np.array([room]))
         assert states.max() < HIGH
     assert found.limits["runaway"].certificate.kind == "regulated" and found.limits["runaway"].certificate.holds
+
+
+def test_what_more_current_does_below_the_runaway_bound(two):
+    """As docs/explanations/limits.md says: free faces are coldest at their own I*, below the bound of set-points."""
+    def cold(current):
+        state = rt.thermal.steady_state(two, {"room": 298.15, **dict.fromkeys(two.modules, current)})
+        return next(one for one in state.equilibria if one.stable).temperatures[two.modules["m2"].cold]
+
+    free, held = (rt.certify.usable_current(two, temperature=(263.15, HIGH), lower="reported", setpoint=setpoint)
+                  .limits["runaway"].current for setpoint in (None, dict.fromkeys(two.modules, 293.15)))
+    assert (free, held) == (pytest.approx(1.476, abs=5e-4), pytest.approx(1.516, abs=5e-4))
+    rising = [cold(current) for current in np.linspace(0.5, free, 6)]
+    assert (np.diff(rising) < 0.0).all() and cold(held) > cold(free) == pytest.approx(273.15 - 4.8, abs=0.05)
+    own = rt.thermal.fold(two, dict.fromkeys(two.modules, cold(free)), ambient={"room": 298.15}).current[-1]
+    assert own.min() == pytest.approx(free, rel=0.01)
+    page = (Path(__file__).resolve().parents[2] / "docs" / "explanations" / "limits.md").read_text(encoding="utf-8")
+    assert "Below the runaway bound more current cools more" not in page and "1.516 A; not regulated" in page
 
 
 def test_headline_of_a_small_module_is_not_its_contraction_limit():

@@ -1,4 +1,4 @@
-"""Logs with a sign turned or two columns exchanged, of a board in plain numpy: said by name, and of no others."""
+"""Logs with a sign turned, two columns exchanged or times in another unit, of a board in numpy: said, of no others."""
 
 import re
 from collections.abc import Callable
@@ -78,6 +78,10 @@ def read(record: rt.Record, inputs: np.ndarray, outputs: np.ndarray | None = Non
     return record.changed(inputs=inputs, outputs=record.outputs if outputs is None else outputs)
 
 
+def timed(record: rt.Record, factor: float) -> rt.Record:
+    return record.changed(sample_time=factor * record.sample_time)
+
+
 def said_of(system: rt.System, records: list[rt.Record]) -> list[str]:
     """What calibration and diagnosis say of the columns; the diagnosis then names nothing."""
     fit = rt.calibrate(system, records)
@@ -93,7 +97,11 @@ def said_of(system: rt.System, records: list[rt.Record]) -> list[str]:
     (lambda one: read(one, one.inputs[:, ::-1]), "The columns of the heaters 'qa' and 'qb' seem to be exchanged",
      "exchange qa and qb in [columns]"),
     (lambda one: read(one, one.inputs, one.outputs[:, ::-1]),
-     "The columns of the thermometers 'Ta' and 'Tb' seem to be exchanged", "exchange Ta and Tb in [columns]")])
+     "The columns of the thermometers 'Ta' and 'Tb' seem to be exchanged", "exchange Ta and Tb in [columns]"),
+    (lambda one: timed(one, 1e3), "The time column seems to be in another unit, its times 1000 times too long",
+     'time_format = "ms" in [record]'),
+    (lambda one: timed(one, 1.0 / 60.0), "another unit, its times 60 times too short", 'time_format = "min" in'),
+    (lambda one: timed(one, 60.0), "another unit, its times 60 times too long", 'time_format = "s" in [record]')])
 def test_a_wrong_column_is_said_by_name(wrongly: Callable[[rt.Record], rt.Record], wrong: str, remedy: str) -> None:
     fit, found = said_of(BOARD, [wrongly(board(1)), wrongly(board(2))])
     falls = r"so read, the fit leaves 0\.0[45]\d* K of the records instead of [0-9.]+ K"

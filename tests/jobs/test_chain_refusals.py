@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from commands import Run
+from heated_bar import write_bar
 
 import robthermal as rt
 
@@ -118,3 +119,21 @@ def test_the_header_proposed_for_a_column_is_the_nearest(tmp_path: Path) -> None
 def test_heat_into_a_lump_that_there_is_not() -> None:
     with pytest.raises(rt.InputError, match="argument heat: there is no lump 'x99'"):
         rt.certify.usable_current(rt.systems.two_module(), temperature=(278.15, 358.15), heat={"x99": (0.0, 1.0)})
+
+
+def test_nothing_to_calibrate_is_refused_in_the_words_of_files(tmp_path: Path, run: Run) -> None:
+    """What is proposed is taken: the same project with that line is run."""
+    project = write_bar(tmp_path)
+    system = tmp_path / "bar.toml"
+    bare = system.read_text().partition("[fit]")[0]
+    for text in (bare, bare + "[fit]\n"):
+        system.write_text(text)
+        said = run("run", project, "--out", tmp_path / "out")
+        assert said.status == 2 and "[calibrate.parameters]: nothing to calibrate: no parameter has a" in said.err
+        assert "or in [fit] of the system file" in said.err and "parameters=" not in said.err
+        alone = run("calibrate", system, tmp_path / "train.csv", "--out", tmp_path / "new.toml")
+        assert alone.status == 2 and "[fit]: nothing to calibrate" in alone.err and "parameters=" not in alone.err
+    line = said.err.partition("system file: ")[2].strip().removesuffix(".")
+    assert line == '"lumps.bar.capacity" = { lower = 10, upper = 250 }'
+    system.write_text(bare.replace("conductance = 0.5", "conductance = 0.4") + "[fit]\n" + line)
+    assert run("calibrate", system, tmp_path / "train.csv", "--out", tmp_path / "new.toml").status == 0

@@ -87,3 +87,21 @@ def test_only_heaters_have_one(tmp_path: Path) -> None:
     with pytest.raises(rt.InputError, match="a heater"):
         rt.read_record(logged(tmp_path, "V"), inputs=["water"], outputs=["T"],
                        columns={"T": {"column": "T", "resistance": 1.0}})
+
+
+@pytest.mark.parametrize(("drive", "unit", "words"), [
+    (", limits = [0.0, 4.0]", "W", "reaches 3000 W, 750 times its declared limit of 4 W: this looks like mW"),
+    (', gain = 5.0, unit = "V", limits = [0.0, 4.0]', "V", "3000 V, 750 times.* of 4 V: this looks like mV"),
+    (', gain = 5.0, unit = "%", limits = [0.0, 4.0]', "%", "3000 %, 750 times.* of 4 %: this looks like another unit")])
+def test_thousandths_of_the_unit_are_refused(drive: str, unit: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(rt.InputError, match=words) as refused:
+        rt.read_record(logged(tmp_path, unit, np.abs(CELLS) * 1000.0), coil(drive),
+                       columns={"drive": {"column": "Drive"}})
+    assert "or correct limits in [inputs.drive]" in str(refused.value)
+
+
+def test_a_misread_cell_of_a_heater_is_said_and_not_refused(tmp_path: Path) -> None:
+    cells = np.where(np.arange(len(CELLS)) == 3, 3000.0, np.abs(CELLS))
+    with pytest.warns(UserWarning, match="'drive' lies outside its declared limits 0 ... 4 in 1 of 6 rows"):
+        rt.read_record(logged(tmp_path, "W", cells), coil(", limits = [0.0, 4.0]"),
+                       columns={"drive": {"column": "Drive"}})

@@ -400,3 +400,15 @@ def test_the_report_tells_temperatures_as_the_file_has_them(tmp_path: Path) -> N
     assert [one["what"] for one in record.imported.actions].count("converted") >= 2
     (first,) = [column for column in record.imported.columns if column.name == "T1"]
     assert first.min == pytest.approx(294.65)
+
+
+@pytest.mark.parametrize(("step", "said"), [
+    (2.0, "25 samples of 2 s, from 0 s, 50 s long"),
+    (2000.0, "25 samples of 2000 s (33.3 min), from 0 s, 13.9 h long"),
+    (86400.0, "25 samples of 86400 s (24 h), from 0 s, 25 days long")])
+def test_the_report_tells_how_long_a_log_is(tmp_path: Path, step: float, said: str) -> None:
+    """Milliseconds read as seconds are weeks."""
+    rows = "\n".join(f"{step * k:g},{21.5 + 0.5 * k},0" for k in range(25))
+    path = tmp_path / "run.csv"
+    path.write_text(f"time,T1 [degC],m1\n{rows}\n", encoding="utf-8")
+    assert said in str(rt.read_record(path, inputs=["m1"], outputs=["T1"]).imported)

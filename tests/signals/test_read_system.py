@@ -69,6 +69,10 @@ FAULTS: dict[str, tuple[str, str]] = {
     "one letter of an ambient": (text(HEADER.replace("room", "rom")), "no column 'room' \\(ambient\\), but 'rom'"),
     "watt of a current": (text(HEADER.replace("m1", "m1 [W]")), r"the current 'm1' is in \[W\]"),
     "milliampere": (text(rows=ROWS.replace(",1.5,", ",1500,")), "'m1' reaches 1500 A, 455 times.*looks like mA.*1000"),
+    "milliwatt": (
+        text(rows=ROWS.replace(",1,25", ",1000,25").replace(",2,25", ",2000,25").replace(",3,25", ",3000,25")),
+        "the heater 'heater' reaches 3000 W, 300 times its declared limit of 10 W: this looks like mW.*unit = .mW.",
+    ),
     "per cent": (text(HEADER.replace("heater", "heater [%]")), r"'heater' is in %.*unit = \"%\" in \[inputs.heater\]"),
     "unknown unit": (text(HEADER.replace("T6", "T6 [furlong]")), "unit 'furlong' is not known"),
     "kelvin declared Celsius": (

@@ -73,6 +73,8 @@ class GateCode(Enum):
                          "side better.")
     AT_THE_BINS = ("The controller was judged at the bins of a measured response only, in floating point: that the "
                    "loop is stable is not proven.", "Give a model of the plant for a proof; step the loop with care.")
+    HEATERS_OFF = ("The heaters of the system file are off in what was computed: only the stated loads are counted.",
+                   "Add the heat of the heaters to the load; certify counts them up to their limits.")
     REPORT_CHANGED = ("report.json is not what the job wrote.", "Run the job again.")
 
     def __init__(self, meaning: str, remedy: str) -> None:

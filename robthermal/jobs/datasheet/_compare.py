@@ -103,6 +103,20 @@ class ComparedModule:
         """Whether the operating point is held, if one was asked for."""
         return self.point is None or bool(self.point.outcome)
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the operating point is beyond: the currents of the sheet, cooling."""
+        if self.point is None:
+            return ()
+        current, largest = abs(self.point.current), max(rating.i_max for rating in self.sheet.ratings)
+        found = []
+        if current > largest:
+            found.append(f"{current:.4g} A are {current / largest:.3g} times the Imax of the sheet, {largest:.4g} A: "
+                         "beyond it nothing of the sheet was measured.")
+        if self.point.load < 0.0:
+            found.append(f"The load is negative: the cold face gives off {-self.point.load:.4g} W, nothing is cooled.")
+        return tuple(found)
+
 
 @dataclass(frozen=True)
 class ModuleComparison:
@@ -180,6 +194,7 @@ class ModuleComparison:
                       points.to_string(index=False, float_format=shown)]
             parts += [f"{one.name}: {one.point.outcome.text}" for one in self.modules
                       if one.point is not None and not one.point.outcome]
+            parts += [f"{one.name}: {' '.join(one.notes)}" for one in self.modules if one.notes]
             if any(one.size is not None for one in self.modules):
                 parts.append("At the largest thermal resistance there is no margin: beyond it the module runs away "
                              "thermally. Without --sink the point is the one there.")
@@ -289,6 +304,7 @@ def _plain(one: ComparedModule) -> dict[str, Any]:
         "point": None if point is None else {**{key: value for key, value in vars(point).items() if key != "outcome"},
                                              "power": point.power, "cop": point.cop if point.power else None,
                                              "outcome": vars(point.outcome)},
+        "notes": list(one.notes),
         "largest_sink": None if one.size is None else one.size.resistance}
 
 

@@ -259,7 +259,7 @@ def _step_section(result: ControllerDesign) -> Section:
         figure = Figure.draw(axes[0].figure, alt=f"Temperatures and currents over time, {way} to the set-points.",
                              caption="Above: what is regulated (lines), set-points (dashed), and cold faces where "
                              "something else is regulated (dotted). Below: currents and their limits (dotted).")
-    seen = "estimated from noisy readings" if result.observer else "taken as measured: the file has no sensors"
+    seen = "estimated from noisy readings" if result.observer else "taken as measured, without an observer"
     text = (f"Simulated from rest at ambient temperature on the nonlinear model; the temperatures are {seen}. "
             f"{f'The set-points move no faster than {rates}. ' if rates else ''}{result.loop.outcome.text}")
     title = "Ramp to the set-points" if rates else "Step to the set-points"
@@ -281,8 +281,7 @@ def _linearity_section(result: ControllerDesign) -> Section:
 
 def _observer_section(system: System, observer: GainObserver | None, loop: ClosedLoop) -> Section:
     if observer is None:
-        return Section("Observer", "The file has no sensors for one: the feedback law needs the temperatures of both "
-                       "faces of every module. Add sensors, or measure the faces.", anchor="observer")
+        return Section("Observer", _without_observer(system), anchor="observer")
     tail = slice(len(loop.time) // 2, None)
     rms = np.sqrt(np.mean((loop.estimate - loop.lumps)[tail] ** 2, axis=0))
     columns = dict(zip(observer.sensors, observer.gain.T, strict=True))
@@ -292,6 +291,28 @@ def _observer_section(system: System, observer: GainObserver | None, loop: Close
             "positive": "gain that keeps the error matrix nonnegative"}[observer.method]
     text = (f"All lumps are reconstructed from {', '.join(observer.sensors)}: {gain}. The errors are those of the "
             "simulated step, second half, with the sensors' noise. "
-            + ("L [K/K] has one column per sensor." if shown else "The gain is in design.json."))
+            + ("L [K/K] has one column per sensor." if shown else "The gain is in design.json.")
+            + _left_out(system, observer.sensors))
     table = Table(frame, f"Error of the observer{' and its gain' if shown else ''}.", digits=3)
     return Section("Observer", text, tables=(table,), anchor="observer")
+
+
+def _without_observer(system: System) -> str:
+    """Why there is none, and what the feedback law needs in its place."""
+    late = _left_out(system, ())
+    if not system.thermometers:
+        why = "The file has no sensors for one."
+    else:
+        why = "None was asked for." if any(not one.lag for one in system.thermometers.values()) else "There is none."
+    return (f"{why}{late} The feedback law needs the temperatures of both faces of every module: add sensors, or "
+            "measure the faces.")
+
+
+def _left_out(system: System, read: Sequence[str]) -> str:
+    """Which sensors are not read because they lag."""
+    late = [f"{name} ({sensor.lag})" for name, sensor in system.thermometers.items() if sensor.lag and name not in read]
+    if not late:
+        return ""
+    return (" Left out, because an observer is certified only with sensors that read their lump at once: "
+            f"{', '.join(late)}. Describe the mass of such a sensor as a lump, linked to the lump it measures, and it "
+            "is read too.")

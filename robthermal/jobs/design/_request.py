@@ -117,13 +117,18 @@ class DesignRequest:
         ------
         InputError
             No modules; a cascade; a module without set-point, or one that does not exist; a set-point outside of the
-            box; current limits beyond the file's or without zero; too many lumps for a certified observer; points,
-            margins or parameters that there are not; another format.
+            box; current limits beyond the file's or without zero; too many lumps for a certified observer; sensors
+            that lag; points, margins or parameters that there are not; another format.
         """
         if not system.modules:
             raise InputError(f"{system.name!r} has no thermoelectric module", where="design",
                              remedy="Add a [modules.NAME] table, or control its heaters directly.")
-        self._refuse_cascade(system)
+        if system.cascade:
+            raise InputError(f"a cascade: {system.cascade}", where="design",
+                             expected="modules side by side: a cascade is not designed at once",
+                             remedy="Leave [design] out: contraction, boxes and limits of a cascade are certified all "
+                             "the same. In Python design one stage, rt.design.feedback_linearization(..., "
+                             "modules=[…]), while the other holds its own temperature.")
         for option, given in (("--setpoint", self.setpoint), ("--current", self.current or {}),
                               ("--regulate", self.regulate or {}), ("--setpoint-ramp", self.setpoint_ramp or {})):
             unknown = [name for name in given if name not in system.modules]
@@ -154,6 +159,8 @@ class DesignRequest:
             raise InputError(f"there is no format {unknown[0]!r}", where="--export", expected=" or ".join(FORMATS))
         for name in self.parameters or {}:
             system.parameter(name)  # refuses unknown names
+        for name in self.sensors:
+            system.prompt_thermometer(name, "--sensors")
         if self.sensors and len(system.lumps) > _MOST_LUMPS:
             raise InputError(f"{len(system.lumps)} lumps are too many for a certified observer", where=system.name,
                              expected=f"at most {_MOST_LUMPS}", remedy="Reduce the system with rt.thermal.reduce, or "
@@ -178,17 +185,6 @@ class DesignRequest:
                 what = "the current_limits" if what == "current_limits" else f"{what}: the supply"
                 raise InputError(f"the range is beyond {what} of the system file", where=where,
                                  expected=f"within {declared.low:.4g}:{declared.high:.4g}")
-
-    def _refuse_cascade(self, system: System) -> None:
-        above = {part.hot: name for name, part in system.modules.items()}
-        for name, part in system.modules.items():
-            if part.cold in above:
-                raise InputError(f"a cascade: module {name!r} cools the hot face {part.cold!r} of module "
-                                 f"{above[part.cold]!r}", where="design", expected="modules side by side: a cascade is "
-                                 "not designed at once",
-                                 remedy="Leave [design] out: contraction, boxes and limits of a cascade are certified "
-                                 "all the same. In Python design one stage, rt.design.feedback_linearization(..., "
-                                 "modules=[…]), while the other holds its own temperature.")
 
 
 def celsius(kelvin: float) -> str:

@@ -43,7 +43,7 @@ def design_from_text(system: System, *, setpoint: Sequence[str] = (), current: S
     sample_time : float
         Time between two samples [s].
     sensors : str, optional
-        Names, separated by commas; default the first sensor on every lump that does not lag.
+        Names, separated by commas; default the first sensor on every lump that does not lag. Empty for no observer.
     method : str
         "energy", "sum", "max" or "lyapunov".
     regulate : sequence of str
@@ -79,7 +79,7 @@ def design_from_text(system: System, *, setpoint: Sequence[str] = (), current: S
     targets = boxes.setpoint or dict.fromkeys(system.modules, boxes.temperature[0])
     limits = {name: pair for name, pair in (boxes.current or {}).items() if name in named}
     request = DesignRequest(targets, limits, boxes.ambient, boxes.temperature, bandwidth, sample_time,
-                            _sensors(system, sensors, sample_time), boxes.method, _regulate(regulate),
+                            _sensors(system, sensors), boxes.method, _regulate(regulate),
                             _margins(margins), formats((export or "").split(",") if export else ()),
                             dict(parameters) if parameters else None, _rates(ramp))
     request.check(system)
@@ -132,7 +132,7 @@ def design_from_table(system: System, table: Mapping[str, Any], boxes: Boxes,
         ambient=boxes.ambient, temperature=boxes.temperature,
         bandwidth=_number(table["bandwidth"], "bandwidth") if "bandwidth" in table else None,
         sample_time=_number(table.get("sample_time", 1.0), "sample_time"),
-        sensors=_sensors(system, None if sensors is None else ",".join(_texts(sensors, "sensors")), 1.0),
+        sensors=_sensors(system, None if sensors is None else ",".join(_texts(sensors, "sensors"))),
         method=boxes_from_text(system, method=str(table.get("method", boxes.method))).method,
         regulate={name: str(point) for name, point in _table(table, "regulate").items()} or None,
         margins=margins or None, export=formats(_texts(table.get("export", ()), "export")),
@@ -221,12 +221,8 @@ def formats(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def _sensors(system: System, text: str | None, sample_time: float) -> tuple[str, ...]:
+def _sensors(system: System, text: str | None) -> tuple[str, ...]:
     if text is not None:
-        names = tuple(name.strip() for name in text.split(","))
-        for name in names:
-            system.thermometer(name, "--sensors")
-        return names
-    first = {sensor.lump: name for name, sensor in reversed(system.thermometers.items())
-             if not sensor.time_constant and not sensor.delay}
+        return tuple(name.strip() for name in text.split(",")) if text.strip() else ()
+    first = {sensor.lump: name for name, sensor in reversed(system.thermometers.items()) if not sensor.lag}
     return tuple(name for name in system.thermometers if name in first.values())

@@ -13,10 +13,10 @@ from ..._joblib import joblib
 from ..._pandas import pd
 from ...certify import LimitMap, UsableCurrent, limit_map, runaway
 from ...errors import InputError
-from ...report import Figure, Report, Section, Table, house_style
+from ...report import Figure, Reason, Report, Section, Table, house_style
 from ...thermal import System
 from ...verification import Certificate, verify
-from ..claims import Checked, machine_assumptions, required_claims
+from ..claims import Checked, GateCode, machine_assumptions, required_claims
 from ..evidence import write_certification
 from ..folder import output_folder
 from ..now import now
@@ -36,7 +36,8 @@ class MapRequest:
     ambient, setpoint : tuple of float
         Of all ambients and all cold faces [K].
     load : tuple of float
-        Heat into every cold face [W]; empty for six values up to the runaway load of the middle set-point.
+        Heat into every cold face [W], the only heat that is counted: the heaters are off; empty for six values up to
+        the runaway load of the middle set-point.
     temperature : tuple of float
         Box of the certificate [K].
     method : str
@@ -86,7 +87,7 @@ def map_from_text(system: System, *, ambient: str | None = None, load: str | Non
     Raises
     ------
     InputError
-        A value that does not read, too many conditions, a system without modules.
+        A value that does not read, too many conditions, a system without modules, a cascade.
 
     Examples
     --------
@@ -97,6 +98,11 @@ def map_from_text(system: System, *, ambient: str | None = None, load: str | Non
     if not system.modules:
         raise InputError(f"{system.name!r} has no thermoelectric module", where="map",
                          remedy="Without modules there is no current to limit: use certify.")
+    if system.cascade:
+        raise InputError(f"a cascade: {system.cascade}", where="map",
+                         expected="modules side by side: a map has one set-point and one load for all cold faces",
+                         remedy="Use certify with a --setpoint for every stage: contraction, boxes and limits of a "
+                         "cascade are certified.")
     boxes = boxes_from_text(system, temperature=temperature, method=method)
     unit, nominal = system.temperature_unit, next(iter(system.ambients.values())).temperature
     ends = sorted((boxes.temperature[0], nominal))
@@ -187,7 +193,7 @@ def write_map(result: LimitMap, system: System, files: tuple[Path, ...], out: st
                     label=simulated_label([system.name, *(file.name for file in files)]),
                     claims=required_claims(checked), sections=(), first=(_section(result, data),),
                     provenance=provenance(files), assumptions=(*machine_assumptions(system), *_ASSUMPTIONS),
-                    generated=now())
+                    generated=now(), gate=_remarks(system), gates=(GateCode.HEATERS_OFF.code,))
     with output_folder(out) as folder:
         report = write_certification(checked, report, folder)
         data.to_csv(folder / "map.csv", index=False)
@@ -201,6 +207,16 @@ def _conditions(result: LimitMap, system: System) -> list[tuple[UsableCurrent, s
     return [entry for entry in found if entry[0].holds] or found[:1]
 
 
+def _remarks(system: System) -> tuple[Reason, ...]:
+    """That the heaters of the file are off, if it has any that can be on."""
+    heaters = [f"{name} (into {heater.lump})" for name, heater in system.inputs.items()
+               if heater.gain]
+    if not heaters:
+        return ()
+    return (Reason("remark", GateCode.HEATERS_OFF.code, "map", "heaters", "The load on the cold faces is all heat that "
+                   f"is counted; off in every row: {', '.join(heaters)}.", GateCode.HEATERS_OFF.remedy),)
+
+
 def _condition(ambient: float, load: float, unit: str) -> str:
     value, name = (ambient, "K") if unit == "K" else (ambient - ZERO_CELSIUS, "°C")
     return f"ambient {value:.4g} {name}, load {load:.4g} W"
@@ -212,7 +228,7 @@ def _checked(key: str, title: str, certificate: Certificate) -> Checked:
 
 _ASSUMPTIONS = (
     "All modules hold their cold faces at one set-point, all ambients have one temperature, every cold face has the "
-    "same load.",
+    "same load. Heaters of the system file are off.",
     "I* and the needed current are computed, not proven. The boxes of the usable currents are proven: never left, and "
     "contracting in them.",
 )

@@ -15,6 +15,7 @@ from ._import import single_rows_filled as single_rows_filled
 
 if TYPE_CHECKING:  # what type checkers and editors see of the table below
     from ._calibrate import calibrate_files as calibrate_files
+    from ._calibrate import refuse_without_ranges as refuse_without_ranges
     from ._frequency import design_excitation as design_excitation
     from ._frequency import estimate_response as estimate_response
     from ._frequency import write_excitation as write_excitation
@@ -25,14 +26,14 @@ if TYPE_CHECKING:  # what type checkers and editors see of the table below
 
 _HOME = {  # name: the module it lives in
     **dict.fromkeys(("design_excitation", "estimate_response", "write_excitation"), "_frequency"),
-    "calibrate_files": "_calibrate",
+    **dict.fromkeys(("calibrate_files", "refuse_without_ranges"), "_calibrate"),
     "read_measured": "_measured",
     **dict.fromkeys(("import_report_beside", "instruments_from_text", "noise_from_text"), "_reference"),
 }
 
 __all__ = ["ReadTable", "calibrate_files", "design_excitation", "estimate_response", "import_report_beside",
            "import_reports", "instruments_from_text", "noise_from_text", "read_files", "read_measured",
-           "reading_from_text", "single_rows_filled", "write_excitation"]
+           "reading_from_text", "refuse_without_ranges", "single_rows_filled", "write_excitation"]
 
 __getattr__ = names_on_first_use(__name__, _HOME)
 

@@ -57,8 +57,34 @@ def calibrate_files(system: System, records: Sequence[Path], validation: Sequenc
         raise InputError("no file is given", where="records", expected="records, frequency responses or both")
     train, held_out = (read_measured(paths, system, median_filter=median_filter, tables=tables)
                        for paths in (records, validation))
+    refuse_without_ranges(system, "[fit]", "[fit] of the system file")
     if operating_point and not any(isinstance(one, FrequencyResponse) for one in (*train, *held_out)):
         raise InputError("an operating point is given with records", where="--operating-point",
                          remedy="Leave it out: a record brings its own inputs.")
     return calibrate(system, train, validation=held_out or None, operating_point=operating_point or None,
                      max_iterations=max_iterations)
+
+
+def refuse_without_ranges(system: System, where: str, tables: str) -> None:
+    """Refuse a calibration of nothing, in the words of files.
+
+    Parameters
+    ----------
+    system : System
+        With its [fit] table, or what stands in its place.
+    where : str
+        Table that is missing or empty, for the message.
+    tables : str
+        Tables that may hold the ranges.
+
+    Raises
+    ------
+    InputError
+        There is no range.
+    """
+    if not system.fit:
+        name, lump = next(iter(system.lumps.items()))
+        raise InputError("nothing to calibrate: no parameter has a range", where=where,
+                         expected="a range for every parameter that may change",
+                         remedy=f'For example in {tables}: "lumps.{name}.capacity" = '
+                                f"{{ lower = {lump.capacity / 5:g}, upper = {lump.capacity * 5:g} }}.")

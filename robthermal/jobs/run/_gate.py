@@ -21,7 +21,8 @@ _FAR, _SHARE = 10.0, 0.2  # K, and part of a current, that a claim may reach bey
 _WARMER, _MORE = 0.5, 0.02  # K, and part of a heat, that the records may be outside of a claim
 _LOOK = "Find what the model lacks with `robthermal diagnose`;"  # of the remedy for a misfit
 _OF_CLAIMS = (GateCode.NOT_CERTIFIED, GateCode.NOT_VERIFIED, GateCode.NOT_ROBUST)  # the cases of the claims say these
-GATES = tuple(code.code for code in GateCode if code not in (*_OF_CLAIMS, GateCode.REPORT_CHANGED))
+_ELSEWHERE = (GateCode.HEATERS_OFF, GateCode.REPORT_CHANGED)  # said by other commands
+GATES = tuple(code.code for code in GateCode if code not in (*_OF_CLAIMS, *_ELSEWHERE))
 
 
 def gate_reasons(result: JobResult) -> tuple[Reason, ...]:

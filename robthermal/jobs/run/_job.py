@@ -18,7 +18,7 @@ from ...signals import Record
 from ...thermal import System
 from ..certify import certify_system, claim_ranges, claims_hold, doubted
 from ..diagnose import Diagnosed, diagnose_records
-from ..measured import read_files
+from ..measured import read_files, refuse_without_ranges
 from ..request import Boxes, Gate, Project
 from ._gate import gate_reasons
 from ._misfit import Misfit, misfit, noise_of_readings
@@ -105,9 +105,16 @@ def calibrated(project: Project, system: System, train: Sequence[Record], valida
         Called with a sentence before every stage.
     responses, held_out : sequence of FrequencyResponse
         Fitted together with `train`, and only compared.
+
+    Raises
+    ------
+    InputError
+        No parameter has a range; as `rt.calibrate`.
     """
     fit = None
     if train or responses:
+        table = "[calibrate.parameters]"
+        refuse_without_ranges(system, table, f"{table}, or in [fit] of the system file")
         data = [f"{sum(r.n_samples for r in train)} samples"] if train else []
         data += [f"{sum(map(len, responses))} bins"] if responses else []
         progress(f"calibrating {len(system.fit)} parameters on {' and '.join(data)}")

@@ -150,6 +150,7 @@ class Import:
         return "\n".join(lines)
 
 
+_DURATIONS = (("days", 86400.0), ("h", 3600.0), ("min", 60.0))
 # A technician compares the table with the file: temperatures are told as they stand there.
 _AS_READ: dict[str, Callable[[float], float]] = {
     "degC": lambda kelvin: kelvin - ZERO_CELSIUS, "degF": lambda kelvin: (kelvin - ZERO_CELSIUS) * 9.0 / 5.0 + 32.0}
@@ -172,7 +173,15 @@ def _row(column: ImportedColumn) -> tuple[str, ...]:
 
 
 def _parts(parts: Sequence[dict[str, Any]], sample_time: float) -> str:
+    words, long = _in_words(sample_time), _in_words(sample_time * sum(part["samples"] for part in parts))
+    step = f"{sample_time:.10g} s" + f" ({words})" * (not words.endswith(" s"))
     if len(parts) == 1:
-        return f"one part of {parts[0]['samples']} samples of {sample_time:.10g} s, from {parts[0]['start']:.10g} s"
+        return f"one part of {parts[0]['samples']} samples of {step}, from {parts[0]['start']:.10g} s, {long} long"
     shown = "; ".join(f"{part['start']:.6g} s: {part['samples']}" for part in parts[:6])
-    return f"{len(parts)} parts of {sample_time:.10g} s ({shown}{'; …' if len(parts) > 6 else ''} samples)"
+    return f"{len(parts)} parts of {step} ({shown}{'; …' if len(parts) > 6 else ''} samples), {long} in all"
+
+
+def _in_words(seconds: float) -> str:
+    """A duration as people say it: a time column in the wrong unit is seen by it."""
+    unit, size = next(((unit, size) for unit, size in _DURATIONS if seconds >= 2.0 * size), ("s", 1.0))
+    return f"{seconds / size:.3g} {unit}"

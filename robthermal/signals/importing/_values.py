@@ -154,9 +154,9 @@ def _check(table: Table, channel: Channel, raw: Array, choice: Declared, clock: 
 
 
 def check_limits(table: Table, values: Values, system: SystemLike) -> None:
-    """Say what is outside of declared limits; a current in milliampere is refused."""
-    raw = {c.name: values.column(c) for c in values.channels}
-    for text in limit_notes(raw, system.current_limits, system.input_limits, table.where):
+    """Say what is outside of declared limits; a current in milliampere and a heat in milliwatt are refused."""
+    raw, units = {c.name: values.column(c) for c in values.channels}, {c.name: c.unit for c in values.channels}
+    for text in limit_notes(raw, units, system.current_limits, system.input_limits, table.where):
         table.actions.append(Action("glitches", 1, text))
 
 
