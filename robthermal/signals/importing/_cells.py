@@ -8,7 +8,7 @@ import numpy as np
 
 from ..._celsius import ZERO_CELSIUS
 from ...errors import InputError
-from ._channel import Channel, kept_factor
+from ._channel import Channel, kept_as_read, kept_factor
 from ._options import ImportOptions
 from ._table import Action, Array, Block, Table, spans
 from ._tokens import DECIMAL_COMMA, SWITCH, THOUSANDS, is_missing, short, thousands_of
@@ -163,9 +163,7 @@ def _in_si(channel: Channel, raw: Array) -> Array:
     if channel.scaled:
         values = channel.scale * raw + channel.offset
         return channel.unit_read.to_si(values) if channel.unit == "K" and channel.unit_read else values
-    if channel.unit_read is None:
-        return raw
-    if channel.unit == channel.unit_read.name:
+    if channel.unit_read is None or kept_as_read(channel):
         return raw
     return channel.unit_read.to_si(raw) * kept_factor(channel)
 
@@ -186,7 +184,7 @@ def mapped_actions(table: Table, channels: Sequence[Channel], of_means: bool) ->
             found.append(Action("converted", len(table.lines), text, header))
         elif c.scaled:
             found.append(Action("converted", len(table.lines), f"{c.name} = {c.scale:g} · cell + {c.offset:g}", header))
-        elif c.unit_read is not None and c.unit_read.name != c.unit and c.unit:
+        elif c.unit_read is not None and c.unit and not kept_as_read(c):
             found.append(Action("converted", len(table.lines), f"{c.name} from {c.unit_read.name} to {c.unit}", header))
     return found
 

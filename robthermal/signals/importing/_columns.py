@@ -13,7 +13,7 @@ from ._heater import heater_channel
 from ._options import ColumnChoice, Declared
 from ._table import Table
 from ._tokens import short
-from ._units import Unit, likely_first, split_header, unit_of
+from ._units import LISTED, Unit, likely_first, split_header, unit_of
 
 Limits = tuple[float, float] | None
 _LISTED = 200  # characters of a list of headers in a message
@@ -182,10 +182,10 @@ def _channel(
     picked = choice.columns.get(name)
     header, scaling = table.headers[place], _scaling(picked)
     where = f"{table.where}, column {header!r}"
-    text = _written(table, name, place, picked) if role == "input" and (picked is None or picked.unit is None) else None
-    if text is not None and unit_of(text) is None and text == (own or (text if gain == 0.0 else None)):
-        return Channel(name, role, place, None, text, *scaling)  # rpm: the system says so, or it is no heat
-    unit = _unit(table, name, place, picked, role)
+    text = _unit_of_its_own(table, name, place, picked, own, gain) if role == "input" else None
+    if text is not None:
+        return Channel(name, role, place, None, text, *scaling)
+    unit = _unit(table, name, place, picked, role, own)
     resistance = None if picked is None else picked.resistance
     if resistance is not None and role != "input":
         raise InputError(f"{name!r} is a {_KINDS.get(role, role)}, and a resistance is declared for it", where=where,
@@ -233,12 +233,21 @@ def _thermistor(name: str, role: str, place: int, unit: Unit | None, characteris
 
 def _written(table: Table, name: str, place: int, picked: ColumnChoice | None) -> str | None:
     """Unit that the header or the units row says, as it is written there."""
-    header = table.headers[place]
-    written = None if header == name and picked is None else split_header(header)[1]
-    return table.units[place] if written is None and table.units and table.units[place].strip("- ") else written
+    return table.unit_text(place, name if picked is None else "")
 
 
-def _unit(table: Table, name: str, place: int, picked: ColumnChoice | None, role: str = "") -> Unit | None:
+def _unit_of_its_own(table: Table, name: str, place: int, picked: ColumnChoice | None, own: str | None,
+                     gain: float) -> str | None:
+    """A unit that is not known, such as l/min, of an input that is kept in it: the system says so, or it is no heat."""
+    written = _written(table, name, place, picked)
+    text = written if picked is None or picked.unit is None else picked.unit.strip()
+    if text is None or any(unit_of(one or "") is not None for one in (text, written)):
+        return None
+    return text if text == own or own is None and gain == 0.0 else None
+
+
+def _unit(table: Table, name: str, place: int, picked: ColumnChoice | None, role: str = "",
+          own: str | None = None) -> Unit | None:
     """Unit of a used column, from its header, the units row or the declaration; two that differ are refused."""
     header = table.headers[place]
     where = f"{table.where}, column {header!r}"
@@ -251,8 +260,7 @@ def _unit(table: Table, name: str, place: int, picked: ColumnChoice | None, role
                 where=where,
                 expected="a known unit",
                 remedy=(f'Write unit = "{written}" in [inputs.{name}]; or ' if role == "input" else "Write ")
-                + f'[columns] {name} = {{ column = "{header}", unit = "…" }}; known: s, A, mA, V, mV, '
-                "W, mW, kW, %, K, mK, degC, degF, ohm.",
+                + f'[columns] {name} = {{ column = "{header}", unit = "{own or "…"}" }}; known: {LISTED}.',
             )
     asked = picked.unit if picked is not None and picked.unit is not None else None
     if picked is not None and asked is None and picked.column.strip() != header:
@@ -260,11 +268,13 @@ def _unit(table: Table, name: str, place: int, picked: ColumnChoice | None, role
     if asked is None:
         return known
     declared = unit_of(asked)
-    if declared is None:
-        raise InputError(f"the declared unit {short(asked)} is not known", where=where, expected="a known unit")
-    if known is not None and known.name != declared.name:
+    if declared is None and known is None:
+        own_too = f'Write unit = "{asked.strip()}" in [inputs.{name}] too; or one of: ' if role == "input" else "Write "
+        raise InputError(f"the declared unit {short(asked)} is not known", where=where, expected="a known unit",
+                         remedy=f"{own_too}{LISTED}.")
+    if known is not None and not known.same_as(declared):
         raise InputError(
-            f"the header says {known.name} and the declaration {declared.name}",
+            f"the header says {known.name} and the declaration {declared.name if declared else short(asked)}",
             where=where,
             expected="one unit",
             remedy="Remove the declaration, or correct it.",
