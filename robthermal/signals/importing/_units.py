@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -116,23 +115,3 @@ def split_header(header: str) -> tuple[str, str | None]:
         if match is not None and match[1] and match[2] in KNOWN and not (pattern is _SUFFIX and match[2] in _NUMBERED):
             return match[1].strip(), match[2]
     return header, None
-
-
-def likely_first(headers: Sequence[str], quantities: Sequence[str]) -> tuple[list[str], bool]:
-    """Headers in the order in which they may be one of some quantities, and whether the first may be.
-
-    Those in a unit of such a quantity come first, those without a known unit next.
-
-    Parameters
-    ----------
-    headers : sequence of str
-        Of columns that nobody has claimed.
-    quantities : sequence of str
-        As of `Unit`; with none the order stays.
-    """
-    def rank(header: str) -> int:
-        unit = unit_of(split_header(header)[1] or "")
-        return 1 if unit is None or not quantities else 0 if unit.quantity in quantities else 2
-
-    ordered = sorted(headers, key=rank)
-    return ordered, bool(ordered) and rank(ordered[0]) < 2
