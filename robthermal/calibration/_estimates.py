@@ -213,13 +213,27 @@ class Estimates:
         }
 
 
+def _of_priors(fit: Estimates) -> str | None:
+    """What to do about parameters that the data leave open, some of which have a prior; None where none has."""
+    given = {name for name, sigma in zip(fit.parameters, fit.sigma, strict=True) if np.isfinite(sigma)}
+    without = [name for name in fit.undetermined_parameters if name not in given]
+    if not given.intersection(fit.undetermined_parameters):
+        return None
+    if not without:
+        return ("Each of these parameters has a prior (sigma), and its prior decides it: see that it is right, fix the "
+                "parameter, or excite the system differently.")
+    names = " or ".join([*filter(None, [", ".join(without[:-1])]), without[-1]])
+    return (f"Fix one of these parameters, give {names} a prior (sigma), or excite the system differently. Each of the "
+            "others has a prior, and its prior decides it.")
+
+
 def outcome_of(fit: Estimates, converged: bool) -> Outcome:
     """What to say of an estimate, and what to do."""
     if not converged:
         return CalibrationCode.NOT_CONVERGED.outcome(f"Stopped after {fit.iterations} iterations without converging.")
     if fit.undetermined:
         return CalibrationCode.UNDETERMINED.outcome(
-            f"Converged, but the data leave open: {'; '.join(fit.undetermined)}.")
+            f"Converged, but the data leave open: {'; '.join(fit.undetermined)}.", remedy=_of_priors(fit))
     stuck = [name for name, at in zip(fit.parameters, fit.at_bound, strict=True) if at]
     if stuck:
         return CalibrationCode.AT_BOUND.outcome(

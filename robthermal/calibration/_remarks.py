@@ -54,8 +54,7 @@ def remarks_of(joint: JointProblem, v: Floats) -> Iterator[str]:
         yield ("The records hold means, which are late or early by up to half a sample of the logger; that is not "
                "estimated here." + (f" If they are late and of {_SAMPLES} samples each, {moved} than it is." if moved
                                     else "") + " `robthermal diagnose` estimates it beside the parameters.")
-    for one in problem.data:
-        yield from within_steps(system, one)
+    yield from within_steps(system, problem.data)
     yield from _beyond_noise(joint, v)
 
 

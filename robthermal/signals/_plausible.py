@@ -15,6 +15,7 @@ RowLabel = Callable[[int], str]
 
 _COLD = 60.0  # °C: what a furnace begins at; in kelvin only liquid helium makes it
 _STEP = 100.0  # K from a row to the next: a change of the unit is 273
+_VALUES, _SHARE = 3, 0.1  # of a column: at most so many values, in so many rows, may be a code for nothing
 _MILLI = 100.0  # a current this many times beyond its limits is in mA, a heat in mW
 _WORDS = {"A": "ampere", "W": "watt", "V": "volt"}
 
@@ -27,7 +28,7 @@ def check_temperature(name: str, column: Array, stamps: Array, unit: str, row: R
     if not wrong.size or (unit != "K" and hottest is None and _heats_up(column)):
         return
     k = int(wrong[0])
-    remedy = "Correct temperature_unit, or the readings if single rows are wrong."
+    remedy = "Correct temperature_unit, or the readings if single rows are wrong" + _as_missing(column, wrong) + "."
     if unit == "K":
         looks, bound = "Celsius", f"below {LOWEST_KELVIN:g} K"
         remedy += f" Machines colder than {LOWEST_KELVIN:g} K are not modelled."
@@ -41,6 +42,14 @@ def check_temperature(name: str, column: Array, stamps: Array, unit: str, row: R
         expected=f"temperatures in {unit}",
         remedy=remedy,
     )
+
+
+def _as_missing(column: Array, wrong: Any) -> str:
+    """What to declare where few cells of few values are wrong: a logger may so say that nothing was measured."""
+    values = np.unique(column[wrong])
+    if len(values) > _VALUES or len(wrong) > _SHARE * np.isfinite(column).sum():
+        return ""
+    return f"; if they mean that nothing was measured: missing = [{', '.join(f'{value:.10g}' for value in values)}]"
 
 
 def _heats_up(column: Array) -> bool:

@@ -129,10 +129,17 @@ def test_a_common_factor_is_named_and_a_prior_settles_it() -> None:
     assert len(fit.undetermined) == 1
     assert "common factor" in fit.undetermined[0]
     assert all(name in fit.undetermined[0] for name in ranges)
+    assert "Fix one of these parameters, give it a prior (sigma), or" in fit.outcome.text
     known = rt.thermal.FitRange(lower=0.1, upper=10.0, sigma=0.01)
     settled = rt.calibrate(system, run, parameters={**ranges, "inputs.q.gain": known})
     assert settled.std["inputs.q.gain"] == pytest.approx(0.01, rel=0.05)
     assert settled.std["lumps.a.capacity"] < 3.0
+    said, others = settled.outcome.text, [name for name in ranges if name != "inputs.q.gain"]
+    assert f"give {', '.join(others[:-1])} or {others[-1]} a prior (sigma)" in said and "its prior decides it" in said
+    every = {name: rt.thermal.FitRange(lower=0.5 * value, upper=2.0 * value, sigma=0.2 * value)
+             for name, value in settled.parameters.items()}
+    said = rt.calibrate(system, run, parameters=every).outcome.text
+    assert "Each of these parameters has a prior (sigma), and its prior decides it" in said and "give" not in said
 
 
 def test_a_ratio_is_named() -> None:

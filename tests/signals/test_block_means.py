@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 
 import numpy as np
@@ -149,6 +150,32 @@ def test_a_calibration_says_that_inputs_change_within_steps(of: int, says: bool)
     fit = rt.calibrate(BAR, rt.signals.block_means(log, of), parameters={"lumps.a.capacity": (20.0, 100.0)})
     said = " ".join(fit.remarks)
     assert ("q changes within" in said and f"within about {5 * of} s are off by more" in said) is says
+
+
+def test_inputs_that_change_within_steps_are_said_once_for_a_file() -> None:
+    """Two heaters in two parts of one log, and another log: a sentence for each log, not six."""
+    system = rt.System(ambients={"room": {"temperature": 295.0}}, lumps={"a": {"capacity": 50.0}},
+                       links=[{"between": ("a", "room"), "conductance": 0.5}],
+                       inputs={"q": {"lump": "a"}, "p": {"lump": "a"}}, sensors={"T": {"lump": "a", "noise": 0.02}})
+    rng = np.random.default_rng(5)
+
+    def log(name: str) -> rt.Record:
+        u = np.repeat(rng.uniform(0.0, 10.0, (20, 2)), 60, axis=0)
+        driven = rt.Record(sample_time=1.0, inputs=u, outputs=np.zeros((len(u), 0)), input_names=["q", "p"],
+                           output_names=[])
+        T = rt.thermal.simulate(system, driven)["T"]
+        return rt.signals.block_means(rt.Record(
+            sample_time=1.0, inputs=u, outputs=T + 0.02 * rng.standard_normal(len(u)), input_names=["q", "p"],
+            output_names=["T"], name=name), 7)
+
+    logs = [log("mon.csv part 1"), log("mon.csv part 2"), log("tue.csv")]
+    fit = rt.calibrate(system, logs, parameters={"lumps.a.capacity": (20.0, 100.0)})
+    found = [one for one in fit.remarks if "within" in one and "steps of record" in one]
+    told = [re.match(r"q and p change within up to (\d+) of the (\d+) steps of record '(.*?)' and act there", one)
+            for one in found]
+    assert [one[3] for one in told if one] == ["mon.csv", "tue.csv"] and len(found) == 2
+    (most, steps), (one_most, one_steps) = [(int(one[1]), int(one[2])) for one in told if one]
+    assert steps == 2 * one_steps and 12 <= one_most <= 17 and 24 <= most <= 34  # 19 changes, 2 of them between steps
 
 
 @pytest.mark.exhaustive

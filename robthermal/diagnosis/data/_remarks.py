@@ -40,7 +40,8 @@ def remarks(system: System, data: Sequence[Data], noise: Mapping[str, float]) ->
     for one in data:
         for name, y in zip(one.sensors, one.readings.T, strict=True):
             said += _of_reading(system, name, y, one)
-        said += [*_copies(one), *_jumps(one, noise), *within_steps(system, one)]
+        said += [*_copies(one), *_jumps(one, noise)]
+    said += within_steps(system, data)
     return tuple(dict.fromkeys(said))
 
 

@@ -34,7 +34,8 @@ class GateCode(Enum):
     NOT_CONVERGED = ("The calibration stopped before it converged: its parameters are no estimate, and have no ranges.",
                      "Raise [calibrate] max_iterations, start closer, or calibrate fewer parameters.")
     UNDETERMINED_PARAMETER = ("The records do not determine a parameter: its range is that of [fit].",
-                              "Excite the system differently, fix the parameter, or give it a prior (sigma).")
+                              "Excite the system differently, fix the parameter, or give it a prior (sigma) if it has "
+                              "none.")
     PARAMETER_AT_BOUND = ("A parameter ended at a bound of [fit].",
                           "Widen the bound if the physics allow, else doubt the structure of the model.")
     CURRENT_BEYOND_RATING = ("Currents exceed what the system file declares as the module's limit.",

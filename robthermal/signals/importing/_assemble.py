@@ -20,7 +20,7 @@ from ._parts import Part
 from ._report import Import, ImportedColumn
 from ._table import Action, Array, Table
 from ._times import Clock
-from ._units import split_header
+from ._units import split_header, unit_of
 from ._values import Values
 
 _LOUD = (
@@ -202,7 +202,7 @@ def make_report(
     for k, header in enumerate(table.headers):
         channel = by_place.get(k)
         if channel is None:
-            unit = split_header(header)[1] or ""
+            unit = (split_header(header)[1] if k in time else table.unit_text(k)) or ""
             columns.append(ImportedColumn(header, "", "time" if k in time else "unused", unit, unit))
             continue
         columns.append(
@@ -210,7 +210,7 @@ def make_report(
                 header,
                 channel.name,
                 {"output": "sensor", "voltage": "sensor"}.get(channel.role, channel.role),
-                channel.unit_read.name if channel.unit_read else "",
+                _unit_read(table, channel),
                 channel.unit,
                 channel.scale,
                 channel.offset,
@@ -250,6 +250,15 @@ def make_report(
         actions=tuple(action.to_dict() for action in table.actions),
         absent=absent,
     )
+
+
+def _unit_read(table: Table, channel: Channel) -> str:
+    """Unit of the cells: as it is known, else as the file says it."""
+    if channel.unit_read is not None:
+        return channel.unit_read.name
+    text = table.unit_text(channel.place, channel.name) or ""
+    known = unit_of(text)
+    return known.name if known is not None else text
 
 
 def system_names(system: SystemLike) -> tuple[str, ...]:

@@ -1,24 +1,20 @@
-"""Cells of the used columns as SI numbers; what is missing is nan, what is a fault code is named."""
+"""Cells of the used columns as SI numbers; what is missing is nan."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..._celsius import ZERO_CELSIUS
 from ...errors import InputError
-from ._channel import Channel, kept_factor
+from ._channel import Channel, kept_as_read, kept_factor
 from ._options import ImportOptions
 from ._table import Action, Array, Block, Table, spans
 from ._tokens import DECIMAL_COMMA, SWITCH, THOUSANDS, is_missing, short, thousands_of
 from ._units import split_header
 
-_CODES = (-127.0, -127.94, 999.0, 9999.0, -999.0, 32767.0, 6553.5, 3276.7)
-_DOUBTED = 85.0  # what a DS18B20 says after power-up, and what a plate may have
 _DRIVES = ("input", "current")
-_JUMP = 10.0  # K or units: into the code, and back
 
 
 class NumberReader:
@@ -148,76 +144,16 @@ def _number(table: Table, line: int, header: str, text: str) -> float:
     return value if np.isfinite(value) else float("nan")
 
 
-def refuse_codes(table: Table, header: str, raw: Array, declared: ImportOptions, temperature: bool) -> None:
-    """Refuse rows that jump to a known fault code and back; 85.0 is only said.
-
-    In a column of no temperatures a code lies beyond all other values.
-
-    Parameters
-    ----------
-    table : Table
-        For the lines in messages, and its list of actions.
-    header : str
-        Of the column.
-    raw : ndarray
-        Its cells as they are written, nan where missing.
-    declared : ImportOptions
-        Import options, of which `missing` is used.
-    temperature : bool
-        Whether the cells are temperatures: then a code that stays until the end is a broken sensor too, and 85 may be
-        what a sensor says after power-up.
-    """
-    known = {float(code) for code in declared.missing if not isinstance(code, str)}
-    codes = (*_CODES, _DOUBTED) if temperature else _CODES
-    doubted = [code for code in codes if code not in known and (raw == code).any()]
-    if not doubted:
-        return
-    index = np.flatnonzero(np.isfinite(raw))
-    values = raw[index]
-    for code in doubted if len(values) > 2 else ():
-        if not temperature and _within(values, code):
-            continue
-        hit = values == code
-        start, stop = _jump(values, hit, code, temperature and code != _DOUBTED)
-        if stop <= start:
-            continue
-        if code != _DOUBTED:
-            how = "and back" if stop < len(values) or stop - start == 1 else "and stays"
-            raise InputError(
-                f"{code:g} jumps there {how}, like a fault code ({int(hit.sum())} such cells)",
-                where=table.place(int(index[start]), header),
-                expected="measured values",
-                remedy=f"Write missing = [{code:g}] to take it as missing.",
-            )
-        text = f"{header!r} reads exactly 85.0 in single rows: a DS18B20 after power-up? "
-        text += "missing = [85.0] takes it as missing"
-        table.actions.append(Action("glitches", stop - start, text, header, [table.lines[int(index[start])]]))
-
-
-def _within(values: Array, code: float) -> bool:
-    """Whether a code lies between the other values, as 999 rpm of a fan does: then it is one of them."""
-    others = values[~np.isin(values, _CODES)]
-    return bool(others.size and others.min() < code < others.max())
-
-
-def _jump(values: Array, hit: NDArray[np.bool_], code: float, may_stay: bool) -> tuple[int, int]:
-    """First run of a code with a jump on either side, (0, 0) if there is none; a single row at an end has one side."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], hit.astype(np.int8), [0]])))
-    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        if hit.all():
-            break
-        brief = stop - start == 1 or may_stay and start > 0
-        before = abs(values[start - 1] - code) > _JUMP if start else brief
-        after = abs(values[stop] - code) > _JUMP if stop < len(values) else brief
-        if before and after:
-            return start, stop
-    return 0, 0
-
-
 def to_si(channel: Channel, raw: Array) -> None:
     """Values of a channel in the unit that is kept, in place."""
     for part in spans(len(raw)):
         raw[part] = _in_si(channel, raw[part])
+
+
+def in_kelvin(channel: Channel) -> tuple[float, float]:
+    """Of a column of temperatures without a thermistor: kelvin = the first + the second · cell."""
+    zero, one = _in_si(channel, np.array([0.0, 1.0])).tolist()
+    return zero, one - zero
 
 
 def _in_si(channel: Channel, raw: Array) -> Array:
@@ -227,9 +163,7 @@ def _in_si(channel: Channel, raw: Array) -> Array:
     if channel.scaled:
         values = channel.scale * raw + channel.offset
         return channel.unit_read.to_si(values) if channel.unit == "K" and channel.unit_read else values
-    if channel.unit_read is None:
-        return raw
-    if channel.unit == channel.unit_read.name:
+    if channel.unit_read is None or kept_as_read(channel):
         return raw
     return channel.unit_read.to_si(raw) * kept_factor(channel)
 
@@ -250,7 +184,7 @@ def mapped_actions(table: Table, channels: Sequence[Channel], of_means: bool) ->
             found.append(Action("converted", len(table.lines), text, header))
         elif c.scaled:
             found.append(Action("converted", len(table.lines), f"{c.name} = {c.scale:g} · cell + {c.offset:g}", header))
-        elif c.unit_read is not None and c.unit_read.name != c.unit and c.unit:
+        elif c.unit_read is not None and c.unit and not kept_as_read(c):
             found.append(Action("converted", len(table.lines), f"{c.name} from {c.unit_read.name} to {c.unit}", header))
     return found
 

@@ -47,6 +47,12 @@ class Channel:
     resistance: float | None = None
 
 
+def kept_as_read(channel: Channel) -> bool:
+    """Whether the numbers stay as they are in the file: nobody says their unit, or it is the one that is kept."""
+    read = channel.unit_read
+    return read is None or read.name == channel.unit or read.same_as(unit_of(channel.unit))
+
+
 def kept_factor(channel: Channel) -> float:
     """Factor from SI to the unit an input is kept in: 1 except for inputs with a unit of their own."""
     own: Any = unit_of(channel.unit) if channel.unit else None

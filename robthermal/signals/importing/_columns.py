@@ -6,27 +6,18 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from ...errors import InputError
-from .._names import misspelt, suggestion
+from .._names import suggestion
 from .._thermistor import Thermistor
 from ._channel import Channel
 from ._heater import heater_channel
+from ._missing import KINDS, Sought, missing, refuse_misspelt
 from ._options import ColumnChoice, Declared
 from ._table import Table
 from ._tokens import short
-from ._units import Unit, likely_first, split_header, unit_of
+from ._units import LISTED, Unit, split_header, unit_of
 
 Limits = tuple[float, float] | None
-_LISTED = 200  # characters of a list of headers in a message
 _SI = {"temperature": "K", "current": "A", "power": "W", "voltage": "V", "resistance": "ohm", "percent": "%"}
-_KINDS = {
-    "input": "heater",
-    "current": "module current",
-    "ambient": "ambient",
-    "sensor": "sensor",
-    "voltage": "module voltage",
-}
-_QUANTITIES = {"input": ("power", "percent"), "current": ("current",), "voltage": ("voltage",),
-               "ambient": ("temperature",), "sensor": ("temperature",)}
 
 
 class SystemLike(Protocol):
@@ -73,13 +64,15 @@ def channels_of_system(table: Table, system: SystemLike, choice: Declared, time:
             )
     units = dict(getattr(system, "input_units", {}))
     gains = dict(getattr(system, "input_gains", {}))
-    places = match(table, tuple(roles), choice.columns, time)
-    unknown = _unknown(table, places, time)
-    for name, role in roles.items():
-        if name not in places:
-            _refuse_misspelt(table, name, role, unknown)
-            if role in ("input", "current"):
-                raise _missing(table, name, role, unknown)
+    sought = [Sought(name, role, choice.columns.get(name), units.get(name), gains.get(name, 1.0))
+              for name, role in roles.items()]
+    places = match(table, sought, time)
+    free = _free(table, places, time)
+    for one in sought:
+        if one.name not in places:
+            refuse_misspelt(table, one, free)
+            if one.role in ("input", "current"):
+                raise missing(table, one, free)
     found = []
     for name, role in roles.items():
         if name in places:
@@ -92,12 +85,13 @@ def channels_of_names(
     table: Table, inputs: Sequence[str], outputs: Sequence[str], choice: Declared, time: Sequence[int]
 ) -> tuple[Channel, ...]:
     """Channels as the caller lists them; outputs without a unit are temperatures."""
-    places = match(table, (*inputs, *outputs), choice.columns, time)
+    sought = [Sought(name, picked=choice.columns.get(name)) for name in (*inputs, *outputs)]
+    places = match(table, sought, time)
     found = []
-    for name in (*inputs, *outputs):
-        if name not in places:
-            raise _missing(table, name, "", _unknown(table, places, time))
-        place = places[name]
+    for one in sought:
+        if one.name not in places:
+            raise missing(table, one, _free(table, places, time))
+        name, place = one.name, places[one.name]
         picked = choice.columns.get(name)
         if picked is not None and picked.resistance is not None:
             found.append(_channel(table, name, "input" if name in inputs else "output", place, choice, "K", None, 1.0))
@@ -126,9 +120,7 @@ def channels_of_names(
     return tuple(found)
 
 
-def match(
-    table: Table, wanted: Sequence[str], columns: Mapping[str, ColumnChoice], time: Sequence[int]
-) -> dict[str, int]:
+def match(table: Table, wanted: Sequence[Sought], time: Sequence[int]) -> dict[str, int]:
     """Name to column: as declared, else by exact header, else by header without unit, else without case."""
     free = [k for k, header in enumerate(table.headers) if header and k not in time]
     exact: dict[str, list[int]] = {}
@@ -141,7 +133,10 @@ def match(
     for k in free:
         folded.setdefault(split_header(table.headers[k])[0].casefold(), []).append(k)
     places: dict[str, int] = {}
-    for name in wanted:
+    columns = {one.name: one.picked for one in wanted if one.picked is not None}
+    absent: list[Sought] = []
+    for one in wanted:
+        name = one.name
         asked = columns[name].column.strip() if name in columns else name
         name_only = split_header(asked)[0] if name in columns else asked
         found = (
@@ -151,8 +146,7 @@ def match(
             or folded.get(asked.casefold())
         )
         if not found:
-            if name in columns:
-                raise _missing(table, asked, "declared", [table.headers[k] for k in free], name)
+            absent += [one] if name in columns else []
             continue
         if len(found) > 1:
             listed = ", ".join(repr(table.headers[k]) for k in found[:4])
@@ -163,6 +157,10 @@ def match(
                 remedy=f'Write columns {name} = "HEADER" exactly, or rename one.',
             )
         places[name] = found[0]
+    if absent:
+        others = {one.name for one in wanted} - {absent[0].name}
+        left = [k for k in _free(table, places, time) if split_header(table.headers[k])[0] not in others]
+        raise missing(table, absent[0], left)
     used: dict[int, str] = {}
     for name, place in places.items():
         if place in used and name not in columns and used[place] not in columns:
@@ -182,13 +180,13 @@ def _channel(
     picked = choice.columns.get(name)
     header, scaling = table.headers[place], _scaling(picked)
     where = f"{table.where}, column {header!r}"
-    text = _written(table, name, place, picked) if role == "input" and (picked is None or picked.unit is None) else None
-    if text is not None and unit_of(text) is None and text == (own or (text if gain == 0.0 else None)):
-        return Channel(name, role, place, None, text, *scaling)  # rpm: the system says so, or it is no heat
-    unit = _unit(table, name, place, picked, role)
+    text = _unit_of_its_own(table, name, place, picked, own, gain) if role == "input" else None
+    if text is not None:
+        return Channel(name, role, place, None, text, *scaling)
+    unit = _unit(table, name, place, picked, role, own)
     resistance = None if picked is None else picked.resistance
     if resistance is not None and role != "input":
-        raise InputError(f"{name!r} is a {_KINDS.get(role, role)}, and a resistance is declared for it", where=where,
+        raise InputError(f"{name!r} is a {KINDS.get(role, role)}, and a resistance is declared for it", where=where,
                          expected="a heater, cells in V or A", remedy="Remove resistance.")
     if picked is not None and picked.thermistor is not None:
         return _thermistor(name, role, place, unit, picked.thermistor, scaling, where)
@@ -224,7 +222,7 @@ def _thermistor(name: str, role: str, place: int, unit: Unit | None, characteris
     wanted = "ohm" if characteristic.divider is None else "V, mV, or counts without a unit"
     fits = unit is None or unit.quantity == ("resistance" if characteristic.divider is None else "voltage")
     if role not in ("sensor", "ambient") or not fits:
-        what = f"{name!r} is a {_KINDS.get(role, role)}" if role not in ("sensor", "ambient") else (
+        what = f"{name!r} is a {KINDS.get(role, role)}" if role not in ("sensor", "ambient") else (
             f"the column is in {unit.name if unit else '?'}")
         raise InputError(f"{what}, and a thermistor is declared for it", where=where,
                          expected=f"a sensor or ambient, cells in {wanted}", remedy="Remove thermistor, or the unit.")
@@ -233,12 +231,21 @@ def _thermistor(name: str, role: str, place: int, unit: Unit | None, characteris
 
 def _written(table: Table, name: str, place: int, picked: ColumnChoice | None) -> str | None:
     """Unit that the header or the units row says, as it is written there."""
-    header = table.headers[place]
-    written = None if header == name and picked is None else split_header(header)[1]
-    return table.units[place] if written is None and table.units and table.units[place].strip("- ") else written
+    return table.unit_text(place, name if picked is None else "")
 
 
-def _unit(table: Table, name: str, place: int, picked: ColumnChoice | None, role: str = "") -> Unit | None:
+def _unit_of_its_own(table: Table, name: str, place: int, picked: ColumnChoice | None, own: str | None,
+                     gain: float) -> str | None:
+    """A unit that is not known, such as l/min, of an input that is kept in it: the system says so, or it is no heat."""
+    written = _written(table, name, place, picked)
+    text = written if picked is None or picked.unit is None else picked.unit.strip()
+    if text is None or any(unit_of(one or "") is not None for one in (text, written)):
+        return None
+    return text if text == own or own is None and gain == 0.0 else None
+
+
+def _unit(table: Table, name: str, place: int, picked: ColumnChoice | None, role: str = "",
+          own: str | None = None) -> Unit | None:
     """Unit of a used column, from its header, the units row or the declaration; two that differ are refused."""
     header = table.headers[place]
     where = f"{table.where}, column {header!r}"
@@ -251,8 +258,7 @@ def _unit(table: Table, name: str, place: int, picked: ColumnChoice | None, role
                 where=where,
                 expected="a known unit",
                 remedy=(f'Write unit = "{written}" in [inputs.{name}]; or ' if role == "input" else "Write ")
-                + f'[columns] {name} = {{ column = "{header}", unit = "…" }}; known: s, A, mA, V, mV, '
-                "W, mW, kW, %, K, mK, degC, degF, ohm.",
+                + f'[columns] {name} = {{ column = "{header}", unit = "{own or "…"}" }}; known: {LISTED}.',
             )
     asked = picked.unit if picked is not None and picked.unit is not None else None
     if picked is not None and asked is None and picked.column.strip() != header:
@@ -260,11 +266,13 @@ def _unit(table: Table, name: str, place: int, picked: ColumnChoice | None, role
     if asked is None:
         return known
     declared = unit_of(asked)
-    if declared is None:
-        raise InputError(f"the declared unit {short(asked)} is not known", where=where, expected="a known unit")
-    if known is not None and known.name != declared.name:
+    if declared is None and known is None:
+        own_too = f'Write unit = "{asked.strip()}" in [inputs.{name}] too; or one of: ' if role == "input" else "Write "
+        raise InputError(f"the declared unit {short(asked)} is not known", where=where, expected="a known unit",
+                         remedy=f"{own_too}{LISTED}.")
+    if known is not None and not known.same_as(declared):
         raise InputError(
-            f"the header says {known.name} and the declaration {declared.name}",
+            f"the header says {known.name} and the declaration {declared.name if declared else short(asked)}",
             where=where,
             expected="one unit",
             remedy="Remove the declaration, or correct it.",
@@ -278,47 +286,7 @@ def _scaling(picked: ColumnChoice | None) -> tuple[float, float, bool]:
     return (1.0 if picked.scale is None else picked.scale), picked.offset or 0.0, True
 
 
-def _unknown(table: Table, places: Mapping[str, int], time: Sequence[int]) -> list[str]:
+def _free(table: Table, places: Mapping[str, int], time: Sequence[int]) -> list[int]:
+    """Columns with a header that nobody uses."""
     used = {*places.values(), *time}
-    return [header for k, header in enumerate(table.headers) if header and k not in used]
-
-
-def _refuse_misspelt(table: Table, name: str, role: str, unknown: Sequence[str]) -> None:
-    for header in unknown:
-        if misspelt(split_header(header)[0], [name]) is not None:
-            others = ", ".join(repr(other) for other in unknown if other != header)
-            others = others if len(others) <= _LISTED else others[:_LISTED] + " …"
-            raise InputError(
-                f"there is no column {name!r} ({_KINDS[role]}), but {header!r}",
-                where=table.where,
-                expected="the names of the system file",
-                remedy=f"Write --column '{name}={header}' (or [columns]) if it is the same; else the column that "
-                f"{name!r} is: {others or 'there is no other'}. If it is none, give {header!r} a name less alike.",
-            )
-
-
-def _missing(table: Table, name: str, role: str, unknown: Sequence[str], wanted: str = "") -> InputError:
-    kind = f" ({_KINDS[role]})" if role in _KINDS else ""
-    if name in table.facts.get("left_out", {}):
-        return InputError(
-            f"column {name!r} is {table.facts['left_out'][name]}",
-            where=table.where,
-            expected="a numeric vector as long as the others",
-        )
-    names = {split_header(header)[0]: header for header in unknown}
-    near = suggestion(name, tuple(names)).split(" Known:")[0] if unknown else ""
-    near = near if near.startswith("Did") else ""
-    ordered, likely = likely_first(unknown, _QUANTITIES.get(role, ()))
-    listed = ", ".join(map(repr, ordered))
-    listed = listed if len(listed) <= _LISTED else listed[:_LISTED] + " …"
-    alike = next((header for own, header in names.items() if f"{own!r}" in near), None)
-    example = alike or (ordered[0] if likely else "HEADER")
-    remedy = f"{near} Write --column '{wanted or name}={example}' (or [columns]) with one of: {listed or 'none left'}."
-    if role in ("input", "current"):
-        remedy += f" Zeros if {name!r} was off: [columns] {name} = {{ constant = 0.0 }}, or what it was throughout."
-    return InputError(
-        f"there is no column {name!r}{kind}",
-        where=table.where,
-        expected="a column for every heater and module" if role in ("input", "current") else "a header of the file",
-        remedy=remedy.strip(),
-    )
+    return [k for k, header in enumerate(table.headers) if header and k not in used]

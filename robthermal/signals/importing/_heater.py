@@ -71,7 +71,7 @@ def heater_channel(
             remedy=f'Write unit = "{unit.name}" in [inputs.{name}], or [columns] {name} = {{ column = …, unit = '
             f'"{unit.name}", scale = (W per {unit.name}) }}.',
         )
-    if unit is None or unit.name == (kept.name if kept else own):
+    if unit is None:
         return Channel(name, "input", place, kept, own, *scaling)
     if kept is not None and unit.quantity == kept.quantity:
         return Channel(name, "input", place, unit, own, *scaling)

@@ -106,7 +106,7 @@ def _glitches(column: NDArray[np.float64]) -> int:
 def _unused(column: ImportedColumn) -> ImportedColumn:
     if column.role == "time":
         return column
-    text = split_header(column.column)[1]
+    text = split_header(column.column)[1] or column.unit_read
     known = unit_of(text) if text else None
     return replace(
         column, name="", role="unused", unit_read=known.name if known else text or "", unit=known.name if known else ""

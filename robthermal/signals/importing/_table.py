@@ -10,6 +10,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ._units import split_header
+
 Array = NDArray[np.float64]
 
 
@@ -137,6 +139,12 @@ class Table:
     actions: list[Action] = field(default_factory=list)
     facts: dict[str, Any] = field(default_factory=dict)
     empty: set[int] = field(default_factory=set)
+
+    def unit_text(self, place: int, name: str = "") -> str | None:
+        """Unit of a column as its header says it, else as the units row does; a header that is `name` says none."""
+        header = self.headers[place]
+        written = None if header == name else split_header(header)[1]
+        return self.units[place] if written is None and self.units and self.units[place].strip("- ") else written
 
     def place(self, row: int, header: str = "") -> str:
         """Words for a row, with its column."""

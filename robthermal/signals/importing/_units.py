@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +22,7 @@ class Unit:
     name : str
         As it is written in reports.
     quantity : str
-        "time", "current", "voltage", "power", "percent", "temperature" or "resistance".
+        "time", "current", "voltage", "power", "percent", "temperature", "resistance" or "rotation" (turns per time).
     factor : float
         Value in SI = factor · cell (+ the zero of a temperature scale).
     """
@@ -33,12 +32,18 @@ class Unit:
     factor: float
 
     def to_si(self, cells: Array) -> Array:
-        """Cells in this unit as SI values (kelvin, ampere, watt, volt, second, ohm; percent stays percent)."""
+        """Cells in this unit as SI values (kelvin, ampere, watt, volt, second, ohm, 1/s; percent stays percent)."""
         if self.name == "degC":
             return celsius_to_kelvin(cells)
         if self.name == "degF":
             return np.asarray(celsius_to_kelvin((cells - 32.0) * 5.0 / 9.0))
         return cells if self.factor == 1.0 else cells * self.factor
+
+    def same_as(self, other: Unit | None) -> bool:
+        """Whether both are one unit, as rpm and 1/min are."""
+        if other is None or self.name == other.name:
+            return other is not None
+        return self.quantity == other.quantity != "temperature" and self.factor == other.factor
 
 
 def _known() -> dict[str, Unit]:
@@ -62,6 +67,13 @@ def _known() -> dict[str, Unit]:
         "degC": ("temperature", 1.0, "°C ℃ degC deg_C C celsius Celsius"),
         "degF": ("temperature", 1.0, "°F ℉ degF deg_F F"),
         "ohm": ("resistance", 1.0, "Ω Ω ohm Ohm"),
+        "rpm": ("rotation", 1 / 60, "rpm"),
+        "1/min": ("rotation", 1 / 60, "1/min min^-1 min-1 min⁻¹"),
+        "U/min": ("rotation", 1 / 60, "U/min Upm"),
+        "r/min": ("rotation", 1 / 60, "r/min rev/min"),
+        "1/s": ("rotation", 1.0, "1/s s^-1 s-1 s⁻¹"),
+        "rps": ("rotation", 1.0, "rps r/s rev/s U/s"),
+        "Hz": ("rotation", 1.0, "Hz"),
     }
     found = {}
     for name, (quantity, factor, spellings) in table.items():
@@ -72,7 +84,10 @@ def _known() -> dict[str, Unit]:
 
 
 KNOWN = _known()
+LISTED = ", ".join(dict.fromkeys(unit.name for unit in KNOWN.values()))
+_NUMBERED = ("s-1", "min-1")  # behind a blank or an underscore the number of a sensor
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*$")
+_PER = re.compile(r"^(.*\S)[ _](\S+/\S+)$")
 _SLASH = re.compile(r"^(.*?)\s*/\s*([^/\s]+)\s*$")
 _SUFFIX = re.compile(r"^(.*\S)[ _](\S+)$")
 _LETTERS = frozenset(text for text in KNOWN if len(text) == 1 and text not in "°C%Ω") | {"C", "F", "K"}
@@ -95,28 +110,8 @@ def split_header(header: str) -> tuple[str, str | None]:
     match = _BRACKETS.match(header)
     if match is not None and match[1]:
         return match[1].strip(), match[2].strip()
-    for pattern in (_SLASH, _SUFFIX):
+    for pattern in (_PER, _SLASH, _SUFFIX):
         match = pattern.match(header)
-        if match is not None and match[1] and match[2] in KNOWN:
+        if match is not None and match[1] and match[2] in KNOWN and not (pattern is _SUFFIX and match[2] in _NUMBERED):
             return match[1].strip(), match[2]
     return header, None
-
-
-def likely_first(headers: Sequence[str], quantities: Sequence[str]) -> tuple[list[str], bool]:
-    """Headers in the order in which they may be one of some quantities, and whether the first may be.
-
-    Those in a unit of such a quantity come first, those without a known unit next.
-
-    Parameters
-    ----------
-    headers : sequence of str
-        Of columns that nobody has claimed.
-    quantities : sequence of str
-        As of `Unit`; with none the order stays.
-    """
-    def rank(header: str) -> int:
-        unit = unit_of(split_header(header)[1] or "")
-        return 1 if unit is None or not quantities else 0 if unit.quantity in quantities else 2
-
-    ordered = sorted(headers, key=rank)
-    return ordered, bool(ordered) and rank(ordered[0]) < 2

@@ -14,13 +14,13 @@ from ._cells import (
     NumberReader,
     from_thermistor,
     mapped_actions,
-    refuse_codes,
     refuse_faults,
     take_codes,
     to_si,
     words_taken,
 )
 from ._channel import Channel
+from ._codes import refuse_codes
 from ._columns import SystemLike
 from ._jitter import settled
 from ._options import Declared
@@ -144,7 +144,7 @@ def _check(table: Table, channel: Channel, raw: Array, choice: Declared, clock: 
     if channel.thermistor is not None:
         return  # its faults are already out, and a resistance or count may have any number
     if channel.role != "voltage":  # a voltage may jump anywhere with its current
-        refuse_codes(table, header, raw, choice.record, channel.unit == "K")
+        refuse_codes(table, channel, raw, choice.record)
     unit = channel.unit_read.name if channel.unit_read is not None else ""
     if channel.unit == "K" and not channel.scaled and unit in ("K", "degC"):
         def words(row: int) -> str:
