@@ -328,7 +328,8 @@ def test_sets_of_several_effects_are_read_apart() -> None:
     """Commas within a set, a semicolon between sets."""
     def found(*names: tuple[tuple[str, tuple[str, ...]], ...]) -> Any:
         effects = [SimpleNamespace(effect=one[0][0], where=one[0][1]) for one in names]
-        return SimpleNamespace(reference=None, effects=effects, alternatives=[one[1:] for one in names])
+        return SimpleNamespace(reference=None, effects=effects, alternatives=[one[1:] for one in names],
+                               nominal=SimpleNamespace(system=SimpleNamespace(inputs={})))
 
     path, other, gain = ("missing_link", ("a", "b")), ("missing_link", ("a", "c")), ("sensor_gain", ("T",))
     mass = ("hidden_mass", ("b",))
