@@ -31,6 +31,7 @@ from ..fitting import (
     refuse_same,
     refuse_short,
     rmse,
+    rmse_by_sensor,
     without_steps,
 )
 from ..signals import Record
@@ -49,7 +50,7 @@ from ._refusals import (
     refuse_same_response,
     refuse_unknown_noise,
 )
-from ._remarks import remarks_of
+from ._remarks import missed, remarks_of
 from ._response_comparison import comparison_of
 from ._response_model import ResponseProblem
 from ._score import score_of
@@ -183,6 +184,8 @@ def _result(solution: Solution, held_out: list[Data], compared: list[MeasuredRes
     residuals = problem.residuals(v)
     system = problem.system.with_parameters(ranges.assigned(values))
     checks = [free_run(system, one, initial, solution.noise) for one in held_out]
+    by_sensor = [_by_sensor(one, r) for one, r in zip(problem.data, residuals, strict=True)]
+    far = missed(system, rmse_by_sensor(by_sensor), checks, solution.noise)
     fit = Fit(
         system=system,
         parameters=dict(zip(ranges.names, values.tolist(), strict=True)),
@@ -195,7 +198,7 @@ def _result(solution: Solution, held_out: list[Data], compared: list[MeasuredRes
         noise=solution.noise,
         data=tuple(one.record for one in problem.data),
         validation_data=tuple(one.record for one in held_out),
-        residuals=tuple(_by_sensor(one, r) for one, r in zip(problem.data, residuals, strict=True)),
+        residuals=tuple(by_sensor),
         validation_residuals=tuple(run.by_sensor for run in checks),
         initial_temperatures=tuple(_by_lump(system, T) for T in problem.temperatures(v)),
         validation_temperatures=tuple(_by_lump(system, run.initial_temperatures) for run in checks),
@@ -208,7 +211,7 @@ def _result(solution: Solution, held_out: list[Data], compared: list[MeasuredRes
         responses=tuple(comparison_of(system, part.one) for part in joint.responses),
         validation_responses=tuple(comparison_of(system, one) for one in compared),
         iterations=solution.iterations,
-        outcome=CalibrationCode.CONVERGED.outcome(), remarks=(*filter(None, said), *remarks_of(joint, v)),
+        outcome=CalibrationCode.CONVERGED.outcome(), remarks=(*filter(None, said), *far, *remarks_of(joint, v)),
     )
     return replace(fit, outcome=outcome_of(fit, solution.converged))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from .._arrays import Floats
 from .._celsius import ZERO_CELSIUS
-from ..fitting import read_while_changing, within_steps
-from ..thermal import parameter_in_words, trajectory
+from ..fitting import FreeRun, read_while_changing, rmse, within_steps
+from ..thermal import System, parameter_in_words, trajectory
 from ._joint import JointProblem
 
 _SAMPLES = 10  # of a mean, for the example
 _LITTLE = 5e-4  # relative change of a parameter that is not worth a word
+_MISSED = 5.0  # times the residual of the records fitted, and the noise: a validation record that is another matter
 _FAR = 3.0  # residuals of so many times the declared noise are more than a declaration somewhat too low
 
 
@@ -56,6 +57,34 @@ def remarks_of(joint: JointProblem, v: Floats) -> Iterator[str]:
                                     else "") + " `robthermal diagnose` estimates it beside the parameters.")
     yield from within_steps(system, problem.data)
     yield from _beyond_noise(joint, v)
+
+
+def missed(system: System, fitted: Mapping[str, float], checks: Sequence[FreeRun], noise: Mapping[str, float]
+           ) -> Iterator[str]:
+    """Validation records that the model misses by far more than those it was fitted to, a sentence each.
+
+    Parameters
+    ----------
+    system : System
+        Calibrated.
+    fitted : mapping
+        Root mean square residual by sensor over the records that were fitted [K or V].
+    checks : sequence of FreeRun
+        Of the validation records.
+    noise : mapping
+        Standard deviation of the sensors [K or V].
+    """
+    for run in checks:
+        found = {name: rmse([e]) for name, e in run.by_sensor.items() if name in fitted}
+        usual = {name: max(fitted[name], noise.get(name, 0.0)) for name in found}
+        far = [name for name in found if usual[name] and found[name] > _MISSED * usual[name]]
+        if far:
+            worst = max(far, key=lambda name: found[name] / usual[name])
+            unit = system.sensors[worst].unit
+            yield (f"{worst} of the validation record {run.one.label!r} is {found[worst]:.2g} {unit} rms off the "
+                   f"model, of the records that were fitted {fitted[worst]:.2g} {unit}: it holds what the model has never "
+                   "seen, the machine has changed, or it is read otherwise: look at the sign, unit and column of every "
+                   "input.")
 
 
 def _beyond_noise(joint: JointProblem, v: Floats) -> Iterator[str]:

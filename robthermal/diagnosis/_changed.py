@@ -26,6 +26,7 @@ from .change import (
     convection_of,
     excess_of,
     held,
+    other_inputs,
     pinned,
     place_of,
     reference_of,
@@ -74,6 +75,8 @@ class Compared:
         Losses taken as natural convection, as the reference records ask for; None where conductances are constant.
     augmented : Augmented or None
         What the reference records alone have added to the model, if that was asked for.
+    other_inputs : tuple of str
+        Columns that nothing in the model follows and that were elsewhere on the days of reference, a sentence each.
 
     Examples
     --------
@@ -93,30 +96,31 @@ class Compared:
     unchanged: dict[str, float] = field(default_factory=dict)
     convection: Convection | None = None
     augmented: Augmented | None = None
+    other_inputs: tuple[str, ...] = ()
 
     @property
     def caveats(self) -> tuple[str, ...]:
         """What the remainder of the reference records says against an answer, a sentence; none if it is small."""
         noise = math.sqrt(max(self.rms**2 - self.remainder**2, 0.0))
         if not self.remainder > _COARSE * noise:
-            return ()
+            return self.other_inputs
         first = "" if self.augmented else (
             ": compare with the model that has what they name by themselves (augment), or diagnose one of them alone")
         return (f"The model leaves {self.remainder:.2g} K of the reference records together, noise would leave "
                 f"{noise:.2g} K. Until it is better, effects at the same lump may stand for each other, a heat into it "
-                f"for a weaker path out of it{first}.",)
+                f"for a weaker path out of it{first}.", *self.other_inputs)
 
     @property
     def beyond_reference(self) -> tuple[str, ...]:
         """That new records within the scatter are farther from the model than any reference record, a sentence."""
         new, most = self.unchanged.get("new", 0.0), self.unchanged.get("reference", math.inf)
         if not new > _FARTHER * most:
-            return ()
-        return (f"The model of the reference records leaves {new:.2g} K of the new records and at most {most:.2g} K of "
-                "a reference record: numbers that differ by a few per cent from day to day would do that, and that "
-                f"they do is assumed beside no more than {self.records} reference "
-                f"record{'s' * (self.records > 1)}, which show less. More of them would tell whether something has "
-                "changed.",)
+            return self.other_inputs
+        return (*self.other_inputs, (
+            f"The model of the reference records leaves {new:.2g} K of the new records and at most {most:.2g} K of a "
+            "reference record: numbers that differ by a few per cent from day to day would do that, and that they do "
+            f"is assumed beside no more than {self.records} reference record{'s' * (self.records > 1)}, which show "
+            "less. More of them would tell whether something has changed."))
 
     def to_dict(self) -> dict[str, Any]:
         """What ``diagnosis.json`` holds under "reference"; null for a change that is not seen at all.
@@ -130,7 +134,7 @@ class Compared:
         model = {key: one.to_dict() for key, one in (("convection", self.convection), ("augmented", self.augmented))
                  if one is not None}
         known = {key: value for key, value in vars(self).items()
-                 if key not in ("visible", "unchanged", "convection", "augmented")}
+                 if key not in ("visible", "unchanged", "convection", "augmented", "other_inputs")}
         where_seen = {"visible": visible} if visible else {}
         return {**known, **where_seen, **({"unchanged": self.unchanged} if self.unchanged else {}), **model}
 
@@ -162,6 +166,7 @@ def changed(system: System, records: Measured | Sequence[Measured], reference: M
     _refuse_same(as_measured(system, reference, "reference"), later)
     refuse_constant(system, records_of(later))
     floor = noise_floor(system, records, noise=noise)
+    elsewhere = other_inputs(system, records_of(later), records_of(as_measured(system, reference, "reference")))
 
     def losses(of: System) -> Convection | None:
         if parameters is not None or not system.fit:
@@ -186,7 +191,7 @@ def changed(system: System, records: Measured | Sequence[Measured], reference: M
         progress("trying every change of a parameter, and every effect of the catalog")
         found = searched(new, healthy, names)
         judged = _judged(found, new, healthy, validation)
-        said = replace(_compared(healthy, found.fit), convection=law, augmented=added)
+        said = replace(_compared(healthy, found.fit), convection=law, augmented=added, other_inputs=elsewhere)
         if judged.verdict != "consistent":
             return judged, said
         seen = visible_changes(new, healthy, found)

@@ -59,6 +59,8 @@ class Found:
         """For tables: ``time_constant = 29.9 ± 0.4 s (or 200 s)``."""
         return ", ".join(f"{name} = {value:.4g} ± {std:.2g} {unit}"
                          + (f" (or {self.either[name]:.3g} {unit})" if name in self.either else "")
+                         + (f" ({self.augmented[name]:.4g} {unit} in the augmented system)"
+                            if abs(self.augmented.get(name, value) - value) > std else "")
                          for name, (value, std, unit) in self.values.items())
 
     def to_dict(self) -> dict[str, Any]:

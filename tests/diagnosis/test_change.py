@@ -352,6 +352,25 @@ def test_a_column_that_heats_nothing_and_a_module_change_by_their_drive() -> Non
     assert sorted(names) == ["inputs.fan.drive.gain", "inputs.heater.gain"]
 
 
+@pytest.mark.parametrize(("turns", "said"), [(3.0, True), (6.0, False)])
+def test_a_column_that_was_elsewhere_on_the_days_of_reference_is_said(turns: float, said: bool, old: list[rt.Record]
+                                                                      ) -> None:
+    """A recorded flow at half of what it was: the answer named a conductance, and not the flow."""
+    text = SYSTEM.replace("[inputs.heater]", '[inputs.flow]\nlump = "sink"\ngain = 0.0\n\n[inputs.heater]')
+
+    def with_flow(one: rt.Record, level: float) -> rt.Record:
+        return rt.Record(sample_time=one.sample_time, inputs=np.column_stack([one.inputs, np.full(len(one), level)]),
+                         outputs=one.outputs, input_names=[*one.input_names, "flow"], output_names=one.output_names)
+
+    slow = record(21, Day({"fan": 0.5}), **SIZES)
+    found = rt.diagnose(rt.thermal.parse_system(text), with_flow(slow, turns),
+                        reference=[with_flow(one, 6.0) for one in old], effects=["sensor_offset"])
+    assert [one.where for one in found.effects] == [(FAN,)]
+    sentences = [one for one in found.caveats if "nothing in the model follows it" in one]
+    assert len(sentences) == said and all(one in found.outcome.text for one in sentences)
+    assert all(one.startswith("flow is 3 in the new records and 6 in the reference records") for one in sentences)
+
+
 def test_a_fan_beside_a_path_that_no_file_has_is_named(rig: rt.System) -> None:
     """What is left without bending other parameters is what a change has to explain: 6.3 K fall to 0.5 K."""
     old = [record(1_101_000 + i, Day(loss=0.15)) for i in range(3)]

@@ -89,6 +89,9 @@ def test_an_effect_that_another_day_confirms_says_so() -> None:
         evidence = Evidence(share=0.3, reproducible=0.9, stability=Stability(4, 0.57), needed=0.98, predicted=predicted)
         return Found("natural_convection", ("plate", "room"), {"gain": (0.2, 0.1, "W/K^1.25")}, 1e-9, 500.0, evidence)
 
+    assert "augmented" not in replace(named(0.0), augmented={"gain": 0.29}).quantities
+    assert replace(named(0.0), augmented={"gain": 0.31}).quantities == (
+        "gain = 0.2 ± 0.1 W/K^1.25 (0.31 W/K^1.25 in the augmented system)")
     assert confirmed([named(0.0)]) == [] and "predicted" not in named(0.0).to_dict()
     sentence, = confirmed([named(0.984), named(0.0)])
     assert sentence.startswith("Over parts of the training records natural_convection(plate, room) does not hold; ")

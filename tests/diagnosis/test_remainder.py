@@ -142,6 +142,19 @@ def test_an_error_that_is_within_the_noise_on_validation_records_is_not_the_one_
     assert str(rest).startswith(f"{rest.gaps['validation'].rms:.2g} K of the error on the validation records")
 
 
+def test_what_validation_records_alone_leave_has_no_place_in_the_training_records():
+    """1.4 K beside 0.008 K were said to sit in a lump, with the heat that would remove them: those of the 0.008 K."""
+    rest = diagnosed("nothing", "nothing", 0).remainder
+    most = max(rest.gaps["train"].rms, rest.noise)
+    assert rest.noise > 0.0 and not rest.elsewhere and rest.where[0][0] in str(rest)
+    for times, elsewhere in ((4.9, False), (5.1, True)):
+        far = replace(rest, gaps={**rest.gaps, "validation": replace(rest.gaps["validation"], rms=times * most)})
+        assert far.elsewhere is elsewhere and (" W rms into " in str(far)) is not elsewhere
+        assert str(far).startswith(f"{times * most:.2g} K of the error on the validation records is not explained")
+    assert "look at the sign, unit and column of every input" in str(far)
+    assert not replace(rest, gaps={"train": rest.gaps["train"]}).elsewhere
+
+
 def test_a_gap_without_excess_is_explained():
     assert left(rt.diagnosis.Gap(3.0, 2.0, 1.0)).share_explained == pytest.approx(5.0 / 8.0)
     assert left(rt.diagnosis.Gap(3.0, 0.9, 1.0)).rms == 0.0

@@ -5,6 +5,7 @@ from ._convective import convection_of as convection_of
 from ._excess import Excess as Excess
 from ._excess import excess_of as excess_of
 from ._held import Held as Held
+from ._other_inputs import other_inputs as other_inputs
 from ._parameter_change import NAME as NAME
 from ._parameter_change import SIZE as SIZE
 from ._parameter_change import parameter_changes as parameter_changes
@@ -23,5 +24,5 @@ from ._visible import visible_changes as visible_changes
 from ._yardstick import effective_number as effective_number
 
 __all__ = ["Convection", "Excess", "Held", "NAME", "Reference", "SIZE", "Search", "Visible", "convection_of",
-           "effective_number", "excess_of", "held", "parameter_changes", "pinned", "place_of", "random_effects",
-           "reference_of", "relative", "searched", "unsteady", "visible_changes"]
+           "effective_number", "excess_of", "held", "other_inputs", "parameter_changes", "pinned", "place_of",
+           "random_effects", "reference_of", "relative", "searched", "unsteady", "visible_changes"]

@@ -18,6 +18,7 @@ from ._line import Line, single_period
 Array = NDArray[np.float64]
 _HELD = 0.8  # of the power, in the band
 _LOCATED = 0.1  # of the remainder, that a free heat into a lump must remove for it to sit there
+_ELSEWHERE = 5.0  # times what the training records leave: where that sits says nothing of the validation records
 _SMALL = 1e-3  # relative singular value of a heat that no reading shows
 
 
@@ -61,6 +62,8 @@ class Remainder:
         What the records of the fit are called.
     voltages : dict
         The same as `sensors` of every voltage of a module that is off by more than its noise [V].
+    noise : float
+        What noise alone would leave of the training records [K].
     """
 
     gaps: dict[str, Left]
@@ -73,14 +76,27 @@ class Remainder:
     line: Line | None = None
     trained: str = "training records"
     voltages: dict[str, float] = field(default_factory=dict)
+    noise: float = 0.0
 
     @property
     def located(self) -> bool:
         """Whether a free heat into one of the lumps would remove enough of it to say that it sits there."""
         return self.where[0][1] >= _LOCATED
 
+    @property
+    def elsewhere(self) -> bool:
+        """Whether validation records are off by so much more that it is not what the training records leave."""
+        validation = self.gaps.get("validation")
+        return validation is not None and "train" in self.gaps and (
+            validation.rms > _ELSEWHERE * max(self.gaps["train"].rms, self.noise))
+
     def __str__(self) -> str:
         """How much, at which sensor and lump, in which band, and whether a single period."""
+        if self.elsewhere:
+            return (f"{self.gaps['validation'].rms:.2g} K of the error on the validation records is not explained, of "
+                    f"that on the {self.trained} {self.gaps['train'].rms:.2g} K: the validation records hold what the "
+                    "model has never seen, their machine has changed, or they are read otherwise: look at the sign, "
+                    "unit and column of every input.")
         seen = "validation" if "validation" in self.gaps and self.gaps["validation"].rms else "train"
         sensor = max(self.sensors, key=lambda name: self.sensors[name])
         kind = "validation records" if seen == "validation" else self.trained
@@ -126,7 +142,7 @@ def remainder(fit: Refit, gaps: Mapping[str, Gap], trained: str = "training reco
     volts = {name: rms for name, rms in beyond.items() if name not in squares and rms > noise[name]}
     where, heat = _places(fit)
     return Remainder({name: left(gap) for name, gap in gaps.items()}, squares, where, *_band(fit), heat,
-                     single_period(fit), trained, volts)
+                     single_period(fit), trained, volts, gaps["train"].noise if "train" in gaps else 0.0)
 
 
 def left(gap: Gap) -> Left:
