@@ -82,9 +82,9 @@ def missed(system: System, fitted: Mapping[str, float], checks: Sequence[FreeRun
             worst = max(far, key=lambda name: found[name] / usual[name])
             unit = system.sensors[worst].unit
             yield (f"{worst} of the validation record {run.one.label!r} is {found[worst]:.2g} {unit} rms off the "
-                   f"model, of the records that were fitted {fitted[worst]:.2g} {unit}: it holds what the model has never "
-                   "seen, the machine has changed, or it is read otherwise: look at the sign, unit and column of every "
-                   "input.")
+                   f"model, of the records that were fitted {fitted[worst]:.2g} {unit}: it holds what the model has "
+                   "never seen, the machine has changed, or it is read otherwise: look at the sign, unit and column of "
+                   "every input.")
 
 
 def _beyond_noise(joint: JointProblem, v: Floats) -> Iterator[str]:

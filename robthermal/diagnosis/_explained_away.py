@@ -56,7 +56,7 @@ def predicting_alone(state: SearchState, finer: Refit, validation: Validation) -
     return at_neighboring_lumps(replace(listed, rounds=tuple(
         replace(round_, contenders=tuple(entry for entry in round_.contenders
                                          if _closes(entry.fit, nominal, validation, share)))
-        for round_ in listed.rounds)))
+        for round_ in listed.rounds)), validation)
 
 
 def _needed(state: SearchState) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
@@ -46,7 +47,7 @@ def with_rivals(state: SearchState, finer: Refit, validation: Validation) -> Sea
         Data that no fit has seen.
     """
     if finer.structure.n_coarse:
-        listed = _with_other_thermometers(at_neighboring_lumps(state), finer, validation)
+        listed = _with_other_thermometers(at_neighboring_lumps(state, validation), finer, validation)
         return _with_other_laws(_at_one_place(listed, finer, validation), finer, validation)
     rounds = []
     for place, round_ in enumerate(state.rounds):
@@ -100,17 +101,36 @@ def _at_one_place(state: SearchState, finer: Refit, validation: Validation) -> S
     return replace(state, rounds=rounds, fit=fit)
 
 
-def at_neighboring_lumps(state: SearchState) -> SearchState:
+def at_neighboring_lumps(state: SearchState, validation: Validation | None = None) -> SearchState:
     """List beside every effect the same one at neighboring lumps, and the lag of a lump's other end.
 
     Parameters
     ----------
     state : SearchState
         With the effects that may be named.
+    validation : Validation, optional
+        Data that no fit has seen: places that predict them better are listed sooner.
     """
     named = {one.best.candidate.key for one in state.rounds}
-    return replace(state, rounds=tuple(with_other_end(with_neighbors(one, state.names), named, state.names)
+
+    def better(entry: Entry) -> bool:
+        others = {one.key for one in entry.fit.structure.effects} - {entry.candidate.key}
+        if validation is None or validation.data is None or len(others) < len(named) - 1 or not others < named:
+            return False  # beside fewer effects than the answer has
+        after, own = (_left_held_out(fit, state.nominal, validation) for fit in (entry.fit, state.fit))
+        return after < own
+
+    return replace(state, rounds=tuple(with_other_end(with_neighbors(one, state.names, better), named, state.names)
                                        for one in state.rounds))
+
+
+def _left_held_out(fit: Refit, nominal: Refit, validation: Validation) -> float:
+    """Free-run error that a fit leaves of validation data; infinite where the model runs away."""
+    try:
+        held = validation.predicted(exact(nominal), exact(fit))
+    except (Diverged, InputError):
+        return math.inf
+    return math.inf if held is None or not math.isfinite(held.gap.after) else held.gap.after
 
 
 def predicting(state: SearchState, finer: Refit, validation: Validation) -> SearchState | None:

@@ -105,6 +105,23 @@ def test_a_path_from_between_two_lumps_has_two_names():
     assert all(neighboring(bar(), entry.candidate, one.best.candidate) for entry in both.contenders)
 
 
+def test_a_place_that_predicts_another_day_better_needs_only_most_of_it():
+    """In a motor the place of a path stood alone, of which the other end took 84 % and predicted better."""
+    one = found(15)
+    decrease = {entry.candidate.where: one.before.rss - entry.fit.rss
+                for entry in _neighbors._refitted(one.before, one.best.candidate, _neighbors._near(one, None))}
+    share = decrease["x2", "x5"] / decrease["x1", "x5"]
+    asked = []
+
+    def better(entry: Entry) -> bool:
+        asked.append(entry.candidate.where[0])
+        return True
+
+    assert 0.75 < share < 0.9 and not with_neighbors(one).contenders
+    assert [entry.candidate.where for entry in with_neighbors(one, None, better).contenders] == [("x2", "x5")]
+    assert "x2" in asked and not with_neighbors(one, None, lambda entry: False).contenders
+
+
 def test_neighboring_places_are_one_answer_and_other_effects_are_not():
     both = with_neighbors(found(16))
     assert both.contenders and one_place(both, bar())

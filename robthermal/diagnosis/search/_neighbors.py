@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,10 +19,14 @@ PATHS = ("missing_link", "missing_ambient_link")  # to a lump, and to what that 
 MASSES = ("hidden_mass", "path_mass")  # on a lump, and within a path that begins there
 _OFF = 1.05  # times an end of a range: nearer is at that end
 ALIKE = 0.9  # of the decrease of the sum of squares: a rival that reaches it is as good where the model is not exact
+_MOST = 0.75  # of that decrease: where another day is predicted better, the training records need not decide
 
 
-def with_neighbors(round_: Accepted, names: Sequence[str] | None = None) -> Accepted:
+def with_neighbors(round_: Accepted, names: Sequence[str] | None = None,
+                   predicts_better: Callable[[Entry], bool] = lambda entry: False) -> Accepted:
     """List beside a heat path those to neighboring lumps, refitted, that do nearly all that it does.
+
+    Or most of it, where records that no fit has seen are predicted better with them.
 
     Of a path to a lump that an ambient cools the other place is that ambient, and the reverse; of a mass on a lump the
     path from there to an ambient.
@@ -37,6 +41,8 @@ def with_neighbors(round_: Accepted, names: Sequence[str] | None = None) -> Acce
         Effect accepted beside a network that may be too coarse.
     names : sequence of str, optional
         Effects that may be named; default the whole catalog.
+    predicts_better : callable
+        Whether records that no fit has seen are predicted better with a rival; asked last.
     """
     best, before = round_.best, round_.before
     near = _near(round_, names)
@@ -48,7 +54,7 @@ def with_neighbors(round_: Accepted, names: Sequence[str] | None = None) -> Acce
         refitted = _refitted(before, own, near)
     except (Diverged, InputError):  # the model beside these records runs away: nothing to compare
         return round_
-    alike = _nearly_best(before, refitted, own)
+    alike = _nearly_best(before, refitted, own, predicts_better)
     listed = {entry.candidate.key for entry in alike}  # ΔBIC and densities say less of places than they do of effects
     return replace(round_, contenders=(*round_.contenders, *alike),
                    ruled_out=tuple(entry for entry in round_.ruled_out if entry.candidate.key not in listed))
@@ -154,8 +160,9 @@ def _refitted(before: Refit, best: Candidate, near: Sequence[Candidate]) -> list
     return entries
 
 
-def _nearly_best(before: Refit, entries: Sequence[Entry], own: Candidate) -> list[Entry]:
-    """Others that reach most of the decrease that the best of them reaches.
+def _nearly_best(before: Refit, entries: Sequence[Entry], own: Candidate, predicts_better: Callable[[Entry], bool]
+                 ) -> list[Entry]:
+    """Others that reach nearly all of the decrease that the best of them reaches, or most of it and predict better.
 
     Where a face of a module is exchanged, in the network as it is: beside a finer one a face takes over what the legs,
     which have no inside there, would do. So a face itself has to reach it in both.
@@ -167,11 +174,14 @@ def _nearly_best(before: Refit, entries: Sequence[Entry], own: Candidate) -> lis
     beside = _decreases(before, entries)
     exchanged = {one.key for one in at_faces} if as_it_is else set()
 
-    def alike(entry: Entry) -> bool:
+    def reaches(share: float, entry: Entry) -> bool:
         asked = [as_it_is] if entry.candidate.key in exchanged else []
         if not asked or faces & (set(entry.candidate.where) - set(own.where)):  # a face must do as much in both
             asked = [*asked, beside]
-        return all(of.get(entry.candidate.key, 0.0) > ALIKE * max(of.values(), default=0.0) for of in asked)
+        return all(of.get(entry.candidate.key, 0.0) > share * max(of.values(), default=0.0) for of in asked)
+
+    def alike(entry: Entry) -> bool:
+        return reaches(ALIKE, entry) or (reaches(_MOST, entry) and predicts_better(entry))
 
     return [entry for entry in entries if entry.candidate.key != own.key and alike(entry) and not _at_an_end(entry)]
 
