@@ -66,7 +66,7 @@ def missed(system: System, fitted: Mapping[str, float], checks: Sequence[FreeRun
     Parameters
     ----------
     system : System
-        Calibrated.
+        Calibrated model with its sensors.
     fitted : mapping
         Root mean square residual by sensor over the records that were fitted [K or V].
     checks : sequence of FreeRun

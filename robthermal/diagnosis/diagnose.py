@@ -280,7 +280,7 @@ def concluded(judged: Judged, trained: str = "training records") -> Diagnosis:
     where = locate(nominal)
     with_rest = unexplained or (judged.plain is not None and judged.verdict != "named")
     rest = _beyond_noise(fit, gap, trained) if with_rest else None
-    resolves = None if rest is None or rest.elsewhere else resolving(rest, nominal.system)
+    resolves = None if rest is None else resolving(rest, nominal.system)
     diagnosis = Diagnosis(
         verdict=judged.verdict, effects=found if named else (), provisional=() if named else found,
         alternatives=tuple(map(alternatives, state.rounds)) if named else (),

@@ -125,7 +125,7 @@ def test_a_lump_without_a_sensor_is_where_one_belongs() -> None:
                                                  if one.lump != "x3"}})
     rest = rt.diagnosis.Remainder({}, {"T6": 0.1}, (("x6", 0.8), ("x3", 0.75), ("x1", 0.2)), 1e-3, 1e-2, 0.8, 0.5)
     what = resolving(rest, bare)
-    assert (what.lump, what.sensor, what.others) == ("x6", "x3", ("x3",))
+    assert what is not None and (what.lump, what.sensor, what.others) == ("x6", "x3", ("x3",))
     assert (what.shortest, what.longest) == (pytest.approx(100.0), pytest.approx(1000.0))
 
 

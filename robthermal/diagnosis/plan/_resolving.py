@@ -66,8 +66,8 @@ class Resolving:
                 "periods": [self.shortest, self.longest], "lumps_alike": list(self.others)}
 
 
-def resolving(rest: Remainder, system: System) -> Resolving:
-    """What would tell where a remainder comes from.
+def resolving(rest: Remainder, system: System) -> Resolving | None:
+    """What would tell where a remainder comes from; None of one that only validation records leave.
 
     Parameters
     ----------
@@ -76,6 +76,8 @@ def resolving(rest: Remainder, system: System) -> Resolving:
     system : System
         Nominal system that was diagnosed.
     """
+    if rest.elsewhere:
+        return None
     places = [(lump, share) for lump, share in rest.where if lump in system.lumps]
     lump, best = places[0]
     alike = tuple(name for name, share in places[1:] if share >= _NEARLY * best)

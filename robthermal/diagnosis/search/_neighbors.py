@@ -162,7 +162,18 @@ def _refitted(before: Refit, best: Candidate, near: Sequence[Candidate]) -> list
 
 def _nearly_best(before: Refit, entries: Sequence[Entry], own: Candidate, predicts_better: Callable[[Entry], bool]
                  ) -> list[Entry]:
-    """Others that reach nearly all of the decrease that the best of them reaches, or most of it and predict better.
+    """Others that reach nearly all of the decrease that the best of them reaches, or most of it and predict better."""
+    shares = _shares(before, entries, own)
+
+    def alike(entry: Entry) -> bool:
+        share = shares[entry.candidate.key]
+        return share > ALIKE or (share > _MOST and predicts_better(entry))
+
+    return [entry for entry in entries if entry.candidate.key != own.key and not _at_an_end(entry) and alike(entry)]
+
+
+def _shares(before: Refit, entries: Sequence[Entry], own: Candidate) -> dict[Key, float]:
+    """Part of the decrease of the best place that every place reaches.
 
     Where a face of a module is exchanged, in the network as it is: beside a finer one a face takes over what the legs,
     which have no inside there, would do. So a face itself has to reach it in both.
@@ -174,16 +185,13 @@ def _nearly_best(before: Refit, entries: Sequence[Entry], own: Candidate, predic
     beside = _decreases(before, entries)
     exchanged = {one.key for one in at_faces} if as_it_is else set()
 
-    def reaches(share: float, entry: Entry) -> bool:
-        asked = [as_it_is] if entry.candidate.key in exchanged else []
-        if not asked or faces & (set(entry.candidate.where) - set(own.where)):  # a face must do as much in both
+    def share(candidate: Candidate) -> float:
+        asked = [as_it_is] if candidate.key in exchanged else []
+        if not asked or faces & (set(candidate.where) - set(own.where)):  # a face must do as much in both
             asked = [*asked, beside]
-        return all(of.get(entry.candidate.key, 0.0) > share * max(of.values(), default=0.0) for of in asked)
+        return min(of.get(candidate.key, 0.0) / max([*of.values(), 1e-300]) for of in asked)
 
-    def alike(entry: Entry) -> bool:
-        return reaches(ALIKE, entry) or (reaches(_MOST, entry) and predicts_better(entry))
-
-    return [entry for entry in entries if entry.candidate.key != own.key and alike(entry) and not _at_an_end(entry)]
+    return {entry.candidate.key: share(entry.candidate) for entry in entries}
 
 
 def _at_an_end(entry: Entry) -> bool:
