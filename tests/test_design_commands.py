@@ -19,6 +19,7 @@ from commands import Run, without_progress
 
 import robthermal as rt
 from robthermal.errors import InputError
+from robthermal.jobs.design._corners import corners
 from robthermal.jobs.design._file import design_numbers
 from robthermal.jobs.design._limits import check_given, contain, worst_runaway
 
@@ -329,6 +330,19 @@ def test_a_heater_that_is_too_strong_for_a_set_point_is_said(bench: rt.System) -
     assert reached == pytest.approx(coldest(strong, 6.0, 303.15, done.law.current_high[0]) - 273.15, abs=0.05)
     assert [(one.ambient["room"], one.heat, one.held) for one in done.corners][:3] == [
         (303.15, {}, True), (288.15, {}, True), (303.15, {"part": 6.0}, False)]
+
+
+@pytest.mark.usefixtures("without_linearity")
+def test_a_heater_whose_power_follows_temperature_counts_at_its_limits(bench: rt.System) -> None:
+    text = BENCH.replace("gain = 2.0\nlimits = [0.0, 0.5]", "gain = 2.0\nlimits = [0.0, 0.5]\npower_slope = 0.004")
+    system = rt.thermal.parse_system(text, "following.toml")
+    wanted = rt.jobs.design.design_from_text(system, setpoint=["m1=12"], bandwidth=0.05, sample_time=2.0)
+    found = corners(rt.design.feedback_linearization(system, current_limits={"m1": (0.0, 2.0)}), wanted)
+    assert [(one.heat, one.heaters, one.held) for one in found] == [({}, {}, True), ({}, {"heater": 0.5}, True)]
+    assert str(found[1]) == "heater at 0.5" and not found[0].heated and found[1].heated
+    plain = corners(rt.design.feedback_linearization(bench, current_limits={"m1": (0.0, 2.0)}), wanted)
+    needed = [one.reach.current["m1"] for one in (found[0], found[1], plain[1]) if one.reach is not None]
+    assert plain[1].heat == {"part": 1.0} and needed[0] < needed[1] == pytest.approx(needed[2], rel=0.05)
 
 
 @pytest.mark.usefixtures("without_linearity")

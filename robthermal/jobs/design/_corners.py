@@ -11,6 +11,9 @@ from ...thermal import System
 from ._limits import ambient_ends
 from ._request import DesignRequest, celsius
 
+Heats = tuple[dict[str, float], dict[str, float]]
+_NONE: Heats = ({}, {})
+
 
 @dataclass(frozen=True)
 class Corner:
@@ -22,6 +25,8 @@ class Corner:
         Ambient to its temperature [K]; the others are nominal.
     heat : dict
         Lump to the heat into it [W]; empty while nothing heats.
+    heaters : dict
+        Heater whose power follows temperature to the value of its column [unit].
     reach : Reachable or None
         How far the set-points are held, and with which currents; None where there is no steady state to start from.
     why : str
@@ -30,8 +35,14 @@ class Corner:
 
     ambient: dict[str, float]
     heat: dict[str, float]
+    heaters: dict[str, float]
     reach: Reachable | None
     why: str = ""
+
+    @property
+    def heated(self) -> bool:
+        """Whether anything heats."""
+        return bool(self.heat or self.heaters)
 
     @property
     def held(self) -> bool:
@@ -41,6 +52,7 @@ class Corner:
     def __str__(self) -> str:
         parts = [f"{name} at {celsius(value)}" for name, value in self.ambient.items()]
         parts += [f"{value:.4g} W into {name}" for name, value in self.heat.items()]
+        parts += [f"{name} at {value:.4g}" for name, value in self.heaters.items()]
         return ", ".join(parts)
 
 
@@ -54,7 +66,7 @@ def corners(law: FeedbackLinearization, request: DesignRequest) -> tuple[Corner,
     request : DesignRequest
         Set-points, ranges of ambients and heats.
     """
-    return tuple(_corner(law, request, at, heat) for heat in ({}, *heat_ends(law.system, request))
+    return tuple(_corner(law, request, at, *heat) for heat in (_NONE, *heat_ends(law.system, request))
                  for at in ambient_ends(request))
 
 
@@ -68,13 +80,13 @@ def first_missed(law: FeedbackLinearization, request: DesignRequest) -> Corner |
     request : DesignRequest
         Set-points, ranges of ambients and heats.
     """
-    heats = ({}, *(heat_ends(law.system, request) if request.heat else ()))
-    found = (_corner(law, request, at, heat) for heat in heats for at in ambient_ends(request))
+    heats = (_NONE, *(heat_ends(law.system, request) if request.heat else ()))
+    found = (_corner(law, request, at, *heat) for heat in heats for at in ambient_ends(request))
     return next((one for one in found if not one.held), None)
 
 
-def heat_ends(system: System, request: DesignRequest) -> list[dict[str, float]]:
-    """The least and the most heat into all lumps at once [W], as far as there is any.
+def heat_ends(system: System, request: DesignRequest) -> list[Heats]:
+    """The least and the most heat into all lumps at once [W], and heaters whose power follows temperature [unit].
 
     Parameters
     ----------
@@ -84,16 +96,19 @@ def heat_ends(system: System, request: DesignRequest) -> list[dict[str, float]]:
         With the heats that are stated.
     """
     ranges = heater_heat(system, stated=request.heat)
-    ends = [{lump: pair[end] for lump, pair in ranges.items() if pair[end]} for end in (0, 1)]
-    return [one for one in ends if one]
+    others = {name: heater.limits if heater.gain > 0.0 else heater.limits[::-1]
+              for name, heater in system.inputs.items() if heater.power_slope and heater.limits is not None}
+    ends = [({lump: pair[end] for lump, pair in ranges.items() if pair[end]},
+             {name: pair[end] for name, pair in others.items() if pair[end]}) for end in (0, 1)]
+    return [one for one in ends if any(one)]
 
 
-def _corner(law: FeedbackLinearization, request: DesignRequest, ambient: dict[str, float], heat: dict[str, float]
-            ) -> Corner:
+def _corner(law: FeedbackLinearization, request: DesignRequest, ambient: dict[str, float], heat: dict[str, float],
+            heaters: dict[str, float]) -> Corner:
     try:
-        return Corner(ambient, heat, reachable(law, request.setpoint, inputs=ambient, load=heat or None,
-                                               regulate=request.regulate))
+        return Corner(ambient, heat, heaters, reachable(law, request.setpoint, inputs=ambient | heaters,
+                                                        load=heat or None, regulate=request.regulate))
     except InputError as refusal:
-        if not heat:  # what is wrong without heat is wrong with the request
+        if not (heat or heaters):  # what is wrong without heat is wrong with the request
             raise
-        return Corner(ambient, heat, None, refusal.what)
+        return Corner(ambient, heat, heaters, None, refusal.what)

@@ -221,7 +221,7 @@ def _numbers(result: ControllerDesign) -> Iterator[tuple[str, str, str]]:
 def _with_heat(corners: Sequence[Corner], name: str) -> str:
     """What a module needs beside the heats that may flow, in words; empty where nothing heats."""
     reached = [one.reach for one in corners if one.held and one.reach is not None]
-    if not any(one.heat for one in corners):
+    if not any(one.heated for one in corners):
         return ""
     if len(reached) < len(corners):
         return " without heat; not held at every heat"

@@ -191,6 +191,7 @@ def _beyond_claims(certification: Certification, facts: DataFacts) -> Iterator[R
     for name, heater in system.inputs.items():
         least, most = (boxes.heat or {}).get(heater.lump, (-np.inf, np.inf))
         heats = [heater.gain * end for end in measured.get(name, (0.0, 0.0))]
-        if max(heats) > most + _MORE * abs(most) or min(heats) < min(least, 0.0) * (1.0 + _MORE):
+        slack = _MORE * max(abs(least), abs(most))
+        if max(heats) > most + slack or min(heats) < min(least, 0.0) - slack:
             yield remark(GateCode.RECORDS_BEYOND_CLAIM, "certify", name, f"The claims are about {least:g} to {most:g} "
                          f"W into {heater.lump}; in the records {name} gives {min(heats):.4g} to {max(heats):.4g} W.")
