@@ -211,11 +211,16 @@ def _numbers(result: ControllerDesign) -> Iterator[tuple[str, str, str]]:
     law, needed = result.law, result.reach.current
     for name, low, high in zip(law.names, law.current_low, law.current_high, strict=True):
         yield (f"current of {name} that holds its set-point", f"{in_table(needed[name], 3)} A",
-               f"computed{_with_heat(result.corners, name)}; the controller keeps to "
+               f"computed{_where(result.corners)}{_with_heat(result.corners, name)}; the controller keeps to "
                f"{inward(float(low), float(high))} A")
     least, loop = min((result.margins.worst(loop).phase, loop) for loop in result.margins.loops)
     yield ("least phase margin", f"{least:.3g}°" if np.isfinite(least) else "no crossover",
            f"loop of {loop}; computed, not proven")
+
+
+def _where(corners: Sequence[Corner]) -> str:
+    """Ambients of the first corner, the warm end of their ranges."""
+    return f" with {corners[0]}" if corners and str(corners[0]) else ""
 
 
 def _with_heat(corners: Sequence[Corner], name: str) -> str:
@@ -224,9 +229,9 @@ def _with_heat(corners: Sequence[Corner], name: str) -> str:
     if not any(one.heated for one in corners):
         return ""
     if len(reached) < len(corners):
-        return " without heat; not held at every heat"
+        return ", without heat; not held at every heat"
     most = max((one.current[name] for one in reached), key=abs)
-    return f" without heat; {in_table(most, 3)} A at most with it"
+    return f", without heat; {in_table(most, 3)} A at most with it"
 
 
 def _controller_section(result: ControllerDesign) -> Section:
