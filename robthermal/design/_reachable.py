@@ -58,6 +58,11 @@ class Reachable:
     faces: dict[str, float]
     temperatures: dict[str, float]
 
+    @property
+    def why(self) -> str:
+        """What sets the limit, in words; empty where nothing does."""
+        return _words(self.binding) if self.binding else ""
+
     def __str__(self) -> str:
         return self.outcome.text
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from ...certify import heater_heat
@@ -66,8 +67,7 @@ def corners(law: FeedbackLinearization, request: DesignRequest) -> tuple[Corner,
     request : DesignRequest
         Set-points, ranges of ambients and heats.
     """
-    return tuple(_corner(law, request, at, *heat) for heat in (_NONE, *heat_ends(law.system, request))
-                 for at in ambient_ends(request))
+    return tuple(_each(law, request, heat_ends(law.system, request)))
 
 
 def first_missed(law: FeedbackLinearization, request: DesignRequest) -> Corner | None:
@@ -80,9 +80,8 @@ def first_missed(law: FeedbackLinearization, request: DesignRequest) -> Corner |
     request : DesignRequest
         Set-points, ranges of ambients and heats.
     """
-    heats = (_NONE, *(heat_ends(law.system, request) if request.heat else ()))
-    found = (_corner(law, request, at, *heat) for heat in heats for at in ambient_ends(request))
-    return next((one for one in found if not one.held), None)
+    heats = heat_ends(law.system, request) if request.heat else []
+    return next((one for one in _each(law, request, heats) if not one.held), None)
 
 
 def heat_ends(system: System, request: DesignRequest) -> list[Heats]:
@@ -101,6 +100,11 @@ def heat_ends(system: System, request: DesignRequest) -> list[Heats]:
     ends = [({lump: pair[end] for lump, pair in ranges.items() if pair[end]},
              {name: pair[end] for name, pair in others.items() if pair[end]}) for end in (0, 1)]
     return [one for one in ends if any(one)]
+
+
+def _each(law: FeedbackLinearization, request: DesignRequest, heats: Sequence[Heats]) -> Iterator[Corner]:
+    """All ends of the ambients' ranges, first without heat."""
+    return (_corner(law, request, at, *heat) for heat in (_NONE, *heats) for at in ambient_ends(request))
 
 
 def _corner(law: FeedbackLinearization, request: DesignRequest, ambient: dict[str, float], heat: dict[str, float],

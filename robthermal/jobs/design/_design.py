@@ -202,7 +202,7 @@ def _refusal(missed: Corner, law: FeedbackLinearization, request: DesignRequest,
     if r is None:
         return InputError(f"with {missed} no set-point can be held: {missed.why}", where="--setpoint",
                           remedy="State less heat, or cool the hot side better.")
-    reason = "the hot side runs away" if r.binding == "runaway" else f"the {r.binding} limit is reached"
+    reason = r.why
     drivable = {name: drivable_range(module, request.temperature) for name, module in law.system.modules.items()
                 if module.supply is not None and r.binding == "current"}
     reason += "".join(f"; {name} can have {one}" for name, one in drivable.items())

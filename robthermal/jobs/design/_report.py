@@ -185,10 +185,9 @@ def _not_held(corner: Corner) -> str:
     if corner.reach is None:
         return f"With {corner} no set-point can be held: {corner.why}."
     r = corner.reach
-    why = "the hot side runs away" if r.binding == "runaway" else f"the {r.binding} limit is reached"
     reached = ", ".join(f"{name} reaches {celsius(value)} instead of {celsius(r.setpoint[name])}"
                         for name, value in r.limit.items())
-    return f"With {corner} the set-points cannot be held: {why}, {reached}."
+    return f"With {corner} the set-points cannot be held: {r.why}, {reached}."
 
 
 def _sections(result: ControllerDesign) -> Iterator[Section]:
